@@ -1,0 +1,1 @@
+"""Recorded streams behind the same interface as live ones: readers, the recorder, the player."""

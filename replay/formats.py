@@ -1,0 +1,59 @@
+"""Which reader opens which recording: known by its content, not only by its name."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from devices.errors import InputError
+from replay.recording import Recording
+
+HEAD_BYTES = 4096
+
+
+@dataclass(frozen=True, slots=True)
+class Format:
+    """One kind of recorded file.
+
+    Attributes:
+        name: what `bunraku info` calls it.
+        recognises: whether a file is of this kind, from its path and its first `HEAD_BYTES` bytes.
+        read: the whole file as a `Recording`; raises InputError naming the file and what is wrong.
+    """
+
+    name: str
+    recognises: Callable[[Path, bytes], bool]
+    read: Callable[[Path], Recording]
+
+
+def formats() -> tuple[Format, ...]:
+    """Every kind of recording that can be opened, the most certain to recognise first."""
+    return ()
+
+
+def recognise(path: Path) -> Format:
+    """The format of the file at `path`.
+
+    Raises:
+        InputError: there is no such file, it cannot be read, or no reader knows it.
+    """
+    try:
+        with path.open("rb") as file:
+            head = file.read(HEAD_BYTES)
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {error.strerror or error}") from error
+    for candidate in formats():
+        if candidate.recognises(path, head):
+            return candidate
+    known = ", ".join(candidate.name for candidate in formats())
+    raise InputError(f"{path} is not a recording that can be read; known kinds: {known}")
+
+
+def read_recording(path: Path) -> Recording:
+    """The recording in the file at `path`, of whatever kind.
+
+    Raises:
+        InputError: see `recognise` and the readers.
+    """
+    return recognise(path).read(path)

@@ -1,0 +1,1 @@
+"""The frame loop and what it drives: characters, session, window, outputs, command line."""

@@ -1,0 +1,1 @@
+"""What a performance leaves behind: video, pictures, point caches, animated models, reports."""
