@@ -1,0 +1,49 @@
+"""Which way a performer faces, so that a turn of the whole body is told from a move of a limb.
+
+AniMesh measures a limb's turns against the capture device. A performer who turns round would then
+swing both arms through the character's body; so the heading is taken out of the pose before the
+limbs are retargeted, and given to the character as a whole where all of it is driven.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+LEVEL = 0.3  # least horizontal share of the left-right axis for a heading to be read from it
+
+
+def heading(positions: Array, pairs: NDArray[np.int64], before: float = 0.0) -> float:
+    """Angle about +Y by which a body has turned from facing +Z.
+
+    Args:
+        positions: (J, 3) [m], +Y up.
+        pairs: (P, 2) indices of left and right joints of hips and shoulders; a body that faces +Z
+            has its left at +X.
+        before: the heading one frame earlier [rad]; the answer is the nearest to it among those
+            that differ by whole turns, and `before` itself when the body lies on its side.
+
+    Returns:
+        The heading [rad], 0 facing +Z, positive to the body's left.
+    """
+    if len(pairs) == 0:
+        return before
+    across = (positions[pairs[:, 0]] - positions[pairs[:, 1]]).sum(axis=0)
+    level = float(np.hypot(across[0], across[2]))
+    if level <= LEVEL * float(np.linalg.norm(across)) or level == 0.0:
+        return before
+    angle = float(np.arctan2(-across[2], across[0]))
+    return before + (angle - before + np.pi) % (2.0 * np.pi) - np.pi
+
+
+def turned(positions: Array, angle: float, about: Array) -> Array:
+    """Positions (n, 3) turned by `angle` [rad] about the vertical through `about` (3,)."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    offset = positions - about
+    out = np.empty_like(offset)
+    out[:, 0] = cosine * offset[:, 0] + sine * offset[:, 2]
+    out[:, 1] = offset[:, 1]
+    out[:, 2] = cosine * offset[:, 2] - sine * offset[:, 0]
+    return out + about
