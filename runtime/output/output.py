@@ -1,0 +1,58 @@
+"""What the frame loop hands to everything that keeps a performance, and how it does so."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PerformedFrame:
+    """One tick of one character's performance, everything solved.
+
+    Attributes:
+        index: counts the frames of the show from 0.
+        time: the performance's time [s], never falling; only differences count.
+        vertices: (N, 3) [m] welded vertices of the character, on the stage.
+        node_positions: (K, 3) [m] where the nodes of the character's skeleton are, on the stage.
+        node_rotations: (K, 4) unit quaternions (x, y, z, w), world, of each node since its rest
+            pose: all of them (0, 0, 0, 1) at rest.
+        picture: (H, W, 4) uint8 sRGB with straight alpha, top row first, or None when nobody needs
+            pictures.
+    """
+
+    index: int
+    time: float
+    vertices: NDArray[np.float64]
+    node_positions: NDArray[np.float64]
+    node_rotations: NDArray[np.float64]
+    picture: NDArray[np.uint8] | None = None
+
+
+class Output(Protocol):
+    """Something that keeps a performance, frame by frame.
+
+    Whatever can be known to fail (no such folder, a wrong suffix, a missing library) fails in the
+    constructor, before the show. `write` and `close` raise InputError when the disk fails. What
+    was written is whole and readable after `close`, however early that comes.
+    """
+
+    @property
+    def needs_picture(self) -> bool:
+        """Whether frames must come with their picture."""
+        ...
+
+    def write(self, frame: PerformedFrame) -> None:
+        """Keep one frame."""
+        ...
+
+    def close(self) -> None:
+        """Finish the file; may be called twice."""
+        ...
+
+    def __enter__(self) -> Self: ...
+
+    def __exit__(self, *exc: object) -> None: ...

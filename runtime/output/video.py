@@ -1,0 +1,199 @@
+"""The pictures of a performance as a video, each shown at the time it was performed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from fractions import Fraction
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from devices.errors import InputError
+from runtime.output.output import PerformedFrame
+from runtime.output.whole_file import check_suffix, check_writable, writing
+
+_TICKS = 90_000  # a second, MPEG's own clock
+_SHORTEST = _TICKS // 1000  # Matroska counts milliseconds: no two frames may fall into one
+_BT709 = 1  # primaries, transfer and matrix alike; ITU-T H.273, tables 2 to 4
+_LIMITED_RANGE = 1  # luma 16 to 235, as players expect
+_H264 = {
+    "libx264": {"crf": "18", "preset": "veryfast"},
+    "libopenh264": {"b": "8M"},
+    "mpeg4": {"qscale": "3", "flags": "+qscale"},
+}
+_ENCODERS: dict[str, dict[str, dict[str, str]]] = {
+    ".mp4": _H264,
+    ".m4v": _H264,
+    ".mov": _H264,
+    ".mkv": _H264,
+    ".webm": {
+        "libvpx-vp9": {"crf": "28", "b": "0", "deadline": "realtime", "cpu-used": "7"},
+        "libvpx": {"crf": "8", "b": "8M", "deadline": "realtime", "cpu-used": "7"},
+    },
+}
+
+
+class Video:
+    """Writes H.264 (VP9 for ``.webm``), 4:2:0, BT.709, every frame exactly once at its own time.
+
+    The frame rate is variable: each frame keeps the time it was performed at, so a recording with
+    gaps or jitter plays with its own timing. An odd side grows by one pixel, its edge repeated;
+    what is transparent is shown on black; pictures of another size than the first are scaled.
+
+    While it grows the file is fragmented, a piece a second, and playable if the program is
+    killed; `close` makes it an ordinary file that seeks everywhere (with an FFmpeg before 8 it
+    stays fragmented, which players take too).
+
+    Args:
+        path: ends in .mp4, .m4v, .mov, .mkv or .webm.
+        rate: about how many frames a second will come; a hint, and how long the last frame is
+            shown when it is the only one.
+
+    Raises:
+        InputError: another suffix, PyAV or an encoder is missing, or the file cannot be written.
+    """
+
+    needs_picture = True
+
+    def __init__(self, path: Path, *, rate: float = 30.0) -> None:
+        encoders = _ENCODERS[check_suffix(path, tuple(_ENCODERS))]
+        check_writable(path)
+        self._av = _import_av(path)
+        self._path = path
+        self._rate = Fraction(min(max(rate, 1.0), 1000.0)).limit_denominator(1001)
+        self._encoder, self._options = _first_available(self._av, encoders, path)
+        self._start = 0.0
+        self._last: int | None = None  # presentation time of the newest frame [ticks]
+        self._stream: Any = None
+        with self._writing():
+            self._container: Any = self._av.open(
+                str(path), "w", options=_container_options(self._av, path.suffix.lower())
+            )
+
+    def write(self, frame: PerformedFrame) -> None:
+        """Encode one picture.
+
+        Raises:
+            InputError: the disk fails.
+        """
+        if frame.picture is None:
+            raise ValueError("Expected `picture` with every frame, got None")
+        if self._container is None:
+            raise ValueError("the video is closed")
+        picture = _even(_opaque(frame.picture))
+        with self._writing():
+            if self._stream is None:
+                self._start = frame.time
+                self._stream = self._add_stream(*picture.shape[1::-1])
+            encoded = self._av.VideoFrame.from_ndarray(picture, format="rgba").reformat(
+                width=self._stream.width,
+                height=self._stream.height,
+                format="yuv420p",
+                dst_colorspace="ITU709",
+            )
+            encoded.time_base = Fraction(1, _TICKS)
+            encoded.pts, encoded.duration = self._place(frame.time)
+            self._container.mux(self._stream.encode(encoded))
+
+    def close(self) -> None:
+        """Finish the file; without a single frame there is none.
+
+        Raises:
+            InputError: the disk fails.
+        """
+        container, self._container = self._container, None
+        if container is None:
+            return
+        with self._writing():
+            try:
+                if self._stream is not None:
+                    container.mux(self._stream.encode(None))
+            finally:
+                container.close()
+        if self._stream is None and self._path.is_file():
+            self._path.unlink()
+
+    def _place(self, time: float) -> tuple[int, int]:
+        """When to show a frame, and for how long if no other follows [ticks]."""
+        ticks = round(_TICKS * (time - self._start))
+        if self._last is None:
+            self._last = ticks
+            return ticks, round(_TICKS / self._rate)
+        shown = max(ticks, self._last + _SHORTEST)
+        step, self._last = shown - self._last, shown
+        return shown, step
+
+    def _add_stream(self, width: int, height: int) -> Any:
+        stream = self._container.add_stream(self._encoder, rate=self._rate, options=self._options)
+        stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
+        codec = stream.codec_context
+        codec.time_base = Fraction(1, _TICKS)
+        codec.gop_size = max(1, round(self._rate))  # a key frame, and so a fragment, a second
+        codec.color_primaries = codec.color_trc = codec.colorspace = _BT709
+        codec.color_range = _LIMITED_RANGE
+        return stream
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        try:
+            with writing(self._path):
+                yield
+        except self._av.FFmpegError as error:
+            raise InputError(f"cannot write {self._path}: {error.strerror or error}") from error
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
+
+
+def _import_av(path: Path) -> Any:
+    try:
+        import av  # noqa: PLC0415
+    except ImportError as error:
+        raise InputError(
+            f"cannot write {path}: video needs the extra: pip install 'bunraku[video]'"
+        ) from error
+    return av
+
+
+def _first_available(
+    av: Any, encoders: dict[str, dict[str, str]], path: Path
+) -> tuple[str, dict[str, str]]:
+    """The first encoder that this FFmpeg has, and its options."""
+    for name, options in encoders.items():
+        if name in av.codecs_available:
+            return name, options
+    raise InputError(
+        f"cannot write {path}: this PyAV has none of the encoders {', '.join(encoders)}; "
+        f"pip install --force-reinstall av, or choose another suffix"
+    )
+
+
+def _container_options(av: Any, suffix: str) -> dict[str, str]:
+    """Flags that make every second of the file readable as soon as it is written."""
+    if suffix not in (".mp4", ".m4v", ".mov"):
+        return {"flush_packets": "1"}  # Matroska is made of clusters that stand alone
+    hybrid = av.library_versions["libavformat"] >= (62,)
+    flags = "hybrid_fragmented" if hybrid else "frag_keyframe+empty_moov+default_base_moof"
+    return {"movflags": flags, "flush_packets": "1"}
+
+
+def _opaque(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """The picture (H, W, 4) as it looks on black."""
+    alpha = picture[..., 3:]
+    if (alpha == 255).all():
+        return picture
+    return ((picture.astype(np.uint16) * alpha + 127) // 255).astype(np.uint8)
+
+
+def _even(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """The picture with even sides, as 4:2:0 needs them: an odd one repeats its last pixels."""
+    height, width = picture.shape[:2]
+    if height % 2 == 0 and width % 2 == 0:
+        return picture
+    return np.pad(picture, ((0, height % 2), (0, width % 2), (0, 0)), mode="edge")
