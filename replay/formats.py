@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from devices.errors import InputError
+from replay.mcap_file import is_mcap, read_mcap
 from replay.recording import Recording
 
 HEAD_BYTES = 4096
@@ -29,7 +30,7 @@ class Format:
 
 def formats() -> tuple[Format, ...]:
     """Every kind of recording that can be opened, the most certain to recognise first."""
-    return ()
+    return (Format("Bunraku recording (MCAP)", is_mcap, read_mcap),)
 
 
 def recognise(path: Path) -> Format:
