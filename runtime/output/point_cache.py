@@ -47,8 +47,12 @@ class PointCache:
         self._points = len(character.surface.vertex)
         with writing(path):
             self._file: BinaryIO | None = path.open("wb", buffering=0)
-            header = _HEADER.pack(b"POINTCACHE2\0", 1, self._points, 0.0, 1.0, 0)
-            self._put(self._file, 0, header)
+            try:
+                header = _HEADER.pack(b"POINTCACHE2\0", 1, self._points, 0.0, 1.0, 0)
+                self._put(self._file, 0, header)
+            except OSError:
+                self._file.close()
+                raise
 
     def write(self, frame: PerformedFrame) -> None:
         """Append one sample.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, Self
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from devices.errors import InputError
 from runtime.output.output import PerformedFrame
+from runtime.output.video_file import VideoFile
 from runtime.output.whole_file import check_suffix, check_writable, writing
 
 _TICKS = 90_000  # a second, MPEG's own clock
@@ -23,6 +24,13 @@ _H264 = {
     "libx264": {"crf": "18", "preset": "veryfast"},
     "libopenh264": {"b": "8M"},
     "mpeg4": {"qscale": "3", "flags": "+qscale"},
+}
+_CONTAINERS = {
+    ".mp4": "mp4",
+    ".m4v": "mp4",
+    ".mov": "mov",
+    ".mkv": "matroska",
+    ".webm": "webm",
 }
 _ENCODERS: dict[str, dict[str, dict[str, str]]] = {
     ".mp4": _H264,
@@ -68,9 +76,11 @@ class Video:
         self._start = 0.0
         self._last: int | None = None  # presentation time of the newest frame [ticks]
         self._stream: Any = None
+        kind = _CONTAINERS[path.suffix.lower()]
         with self._writing():
+            self._file = VideoFile(path)
             self._container: Any = self._av.open(
-                str(path), "w", options=_container_options(self._av, path.suffix.lower())
+                self._file, "w", format=kind, options=_container_options(self._av, kind)
             )
 
     def write(self, frame: PerformedFrame) -> None:
@@ -96,7 +106,8 @@ class Video:
             )
             encoded.time_base = Fraction(1, _TICKS)
             encoded.pts, encoded.duration = self._place(frame.time)
-            self._container.mux(self._stream.encode(encoded))
+            with self._file.piece():
+                self._container.mux(self._stream.encode(encoded))
 
     def close(self) -> None:
         """Finish the file; without a single frame there is none.
@@ -107,12 +118,14 @@ class Video:
         container, self._container = self._container, None
         if container is None:
             return
-        with self._writing():
+        with self._writing(), closing(self._file):
             try:
-                if self._stream is not None:
-                    container.mux(self._stream.encode(None))
+                if self._stream is not None and not self._file.abandoned:
+                    with self._file.piece():
+                        container.mux(self._stream.encode(None))
             finally:
-                container.close()
+                with self._file.piece():
+                    container.close()
         if self._stream is None and self._path.is_file():
             self._path.unlink()
 
@@ -131,6 +144,7 @@ class Video:
         stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
         codec = stream.codec_context
         codec.time_base = Fraction(1, _TICKS)
+        codec.max_b_frames = 0  # or the first frame would come late by what they reorder
         codec.gop_size = max(1, round(self._rate))  # a key frame, and so a fragment, a second
         codec.color_primaries = codec.color_trc = codec.colorspace = _BT709
         codec.color_range = _LIMITED_RANGE
@@ -140,7 +154,10 @@ class Video:
     def _writing(self) -> Iterator[None]:
         try:
             with writing(self._path):
-                yield
+                try:
+                    yield
+                except self._av.FFmpegError as error:
+                    raise self._file.error or error from error
         except self._av.FFmpegError as error:
             raise InputError(f"cannot write {self._path}: {error.strerror or error}") from error
 
@@ -174,9 +191,9 @@ def _first_available(
     )
 
 
-def _container_options(av: Any, suffix: str) -> dict[str, str]:
+def _container_options(av: Any, kind: str) -> dict[str, str]:
     """Flags that make every second of the file readable as soon as it is written."""
-    if suffix not in (".mp4", ".m4v", ".mov"):
+    if kind not in ("mp4", "mov"):
         return {"flush_packets": "1"}  # Matroska is made of clusters that stand alone
     hybrid = av.library_versions["libavformat"] >= (62,)
     flags = "hybrid_fragmented" if hybrid else "frag_keyframe+empty_moov+default_base_moof"

@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 import numpy as np
+import pytest
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -125,3 +130,17 @@ def _picture(index: int, width: int, height: int) -> NDArray[np.uint8]:
     top = 2 * index % max(height - 16, 1)
     picture[top : top + 16, 8:24, :3] = 255
     return picture
+
+
+@contextmanager
+def disk_of(size: int) -> Iterator[None]:
+    """A block in which no file grows beyond `size` bytes, as if the disk were full."""
+    resource = pytest.importorskip("resource")
+    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
+    ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, limits[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
+        signal.signal(signal.SIGXFSZ, ignored)

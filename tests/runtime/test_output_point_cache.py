@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from devices.errors import InputError
 from runtime.output.point_cache import PointCache
-from tests.runtime.tentacle import make_show, make_tentacle
+from tests.runtime.tentacle import disk_of, make_show, make_tentacle
 
 
 def read_pc2(path: Path) -> tuple[tuple[object, ...], NDArray[np.float64]]:
@@ -64,7 +64,7 @@ def test_a_killed_show_leaves_all_its_frames(tmp_path: Path) -> None:
         import os, signal, sys
         from pathlib import Path
         from runtime.output.point_cache import PointCache
-        from tests.runtime.tentacle import make_show, make_tentacle
+        from tests.runtime.tentacle import disk_of, make_show, make_tentacle
         character = make_tentacle()
         cache = PointCache(Path(sys.argv[1]), character)
         for frame in make_show(character, frames=7):
@@ -84,22 +84,14 @@ def test_a_full_disk_is_one_line() -> None:
 
 
 def test_a_sample_that_did_not_fit_is_cut_off(tmp_path: Path) -> None:
-    resource = pytest.importorskip("resource")
     character = make_tentacle()
     show = make_show(character, frames=3)
-    path = tmp_path / "a.pc2"
     sample = 12 * len(character.surface.vertex)
-    limits = resource.getrlimit(resource.RLIMIT_FSIZE)
-    ignored = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
-    resource.setrlimit(resource.RLIMIT_FSIZE, (32 + 2 * sample + sample // 2, limits[1]))
-    try:
-        cache = PointCache(path, character)
+    with disk_of(32 + 2 * sample + sample // 2):
+        cache = PointCache(tmp_path / "a.pc2", character)
         cache.write(show[0])
         cache.write(show[1])
         with pytest.raises(InputError, match="File too large"):
             cache.write(show[2])
         cache.close()
-    finally:
-        resource.setrlimit(resource.RLIMIT_FSIZE, limits)
-        signal.signal(signal.SIGXFSZ, ignored)
-    assert len(read_pc2(path)[1]) == 2
+    assert len(read_pc2(tmp_path / "a.pc2")[1]) == 2

@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 import textwrap
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -14,25 +15,26 @@ from numpy.typing import NDArray
 from devices.errors import InputError
 from runtime.output.output import PerformedFrame
 from runtime.output.video import Video
-from tests.runtime.tentacle import make_show, make_tentacle
+from tests.runtime.tentacle import disk_of, make_show, make_tentacle
 
 av = pytest.importorskip("av")
 
 SIZE = (128, 96)
 
 
-def record(path: Path, show: list[PerformedFrame], rate: float = 30.0) -> None:
+def record(path: Path, show: Iterable[PerformedFrame], rate: float = 30.0) -> None:
     with Video(path, rate=rate) as video:
         for frame in show:
             video.write(frame)
 
 
 def decode(path: Path) -> tuple[list[float], list[NDArray[np.uint8]], float]:
-    """Times [s] and pictures (H, W, 3) of all frames, and the duration [s] of the file."""
+    """Times [s] and pictures (H, W, 3) of all frames, and the duration [s] that the file tells."""
     with av.open(str(path)) as container:
         decoded = list(container.decode(video=0))
         pictures = [frame.to_ndarray(format="rgb24") for frame in decoded]
-        return [frame.time for frame in decoded], pictures, container.duration / av.time_base
+        told = (container.duration or 0) / av.time_base  # 0 where the file was never finished
+        return [frame.time for frame in decoded], pictures, told
 
 
 @pytest.mark.parametrize("name", ["a.mp4", "a.mov", "a.mkv", "a.webm", "A.MP4"])
@@ -103,11 +105,13 @@ def test_a_show_without_frames_leaves_no_file(tmp_path: Path) -> None:
 
 def test_an_interrupted_show_plays_up_to_there(tmp_path: Path) -> None:
     show = make_show(make_tentacle(), frames=20, size=SIZE)
-    with pytest.raises(KeyboardInterrupt), Video(tmp_path / "a.mp4") as video:
-        for frame in show:
-            if frame.index == 13:
-                raise KeyboardInterrupt
-            video.write(frame)
+
+    def interrupted() -> Iterator[PerformedFrame]:
+        yield from show[:13]
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        record(tmp_path / "a.mp4", interrupted())
     assert len(decode(tmp_path / "a.mp4")[0]) == 13
 
 
@@ -144,3 +148,17 @@ def test_a_full_disk_is_one_line(tmp_path: Path) -> None:
     (tmp_path / "a.mp4").symlink_to("/dev/full")
     with pytest.raises(InputError, match=r"a\.mp4: No space left on device"):
         record(tmp_path / "a.mp4", make_show(make_tentacle(), frames=90, size=SIZE))
+
+
+@pytest.mark.parametrize("name", ["a.mp4", "a.mkv"])
+@pytest.mark.parametrize("missing", [20, 500, 2_000, 30_000])  # in the trailer, in a piece
+def test_a_disk_that_fills_leaves_what_plays(tmp_path: Path, name: str, missing: int) -> None:
+    frame = make_show(make_tentacle(), frames=1, size=(64, 48))[0]
+    noise = np.random.default_rng(0).integers(0, 256, (70, 48, 64, 4)).astype(np.uint8)
+    noise[..., 3] = 255
+    show = [replace(frame, time=index / 30, picture=picture) for index, picture in enumerate(noise)]
+    record(tmp_path / name, show)
+    size = (tmp_path / name).stat().st_size
+    with disk_of(size - missing), pytest.raises(InputError, match="File too large"):
+        record(tmp_path / name, show)
+    assert 30 <= len(decode(tmp_path / name)[0]) <= 70

@@ -13,9 +13,14 @@ from runtime.output.whole_file import check_suffix, check_writable, whole_file, 
 def test_a_file_appears_whole_or_not_at_all(tmp_path: Path) -> None:
     target = tmp_path / "show.json"
     target.write_text("old")
-    with pytest.raises(KeyboardInterrupt), whole_file(target) as path:
-        path.write_text("half")
-        raise KeyboardInterrupt
+
+    def interrupted() -> None:
+        with whole_file(target) as path:
+            path.write_text("half")
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
     assert target.read_text() == "old"
     with whole_file(target) as path:
         path.write_text("new")
