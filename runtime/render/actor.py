@@ -1,0 +1,268 @@
+"""One character on the stage: its buffers, what it is made of, and the chains that light up."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from PIL import Image
+
+from runtime.character import Character, Material
+from runtime.render.smoothing import DrawVertices, fill_draw_vertices, split_vertices
+from runtime.render.tubes import chain_tubes
+
+SRGB8_ALPHA8 = 0x8C43
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ActorPrograms:
+    """The programs that actors are drawn with, shared by all on a stage."""
+
+    depth: moderngl.Program
+    plain: moderngl.Program
+    textured: moderngl.Program
+    mirror: moderngl.Program
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Part:
+    """A run of triangles of one material."""
+
+    first: int
+    count: int
+    tint: tuple[float, ...]
+    mirror_tint: tuple[float, ...]
+    image: moderngl.Texture | None
+    see_through: bool
+
+
+class Actor:
+    """A character that stands on a stage; made by `Stage.add`.
+
+    Attributes:
+        name: the character's, shown as its caption.
+        position: (3,) [m] where its origin stands on the stage.
+    """
+
+    def __init__(
+        self,
+        context: moderngl.Context,
+        programs: ActorPrograms,
+        character: Character,
+        position: ArrayLike,
+    ) -> None:
+        self.name = character.name
+        self.position = np.array(position, dtype=np.float64).reshape(3)
+        self._context = context
+        self._programs = programs
+        self._split = split_vertices(character)
+        self._rest_shape = character.vertices.shape
+        self._scratch = _Scratch.of(self._split)
+        self._moving = context.buffer(reserve=max(self._scratch.out.nbytes, 4), dynamic=True)
+        self._parts, self._order = _parts(context, character)
+        self._constant = context.buffer(_constant_attributes(character, self._split))
+        triangles = self._split.triangles[self._order]
+        self._indices = context.buffer(triangles.tobytes() or bytes(12))
+        self._arrays = self._vertex_arrays()
+        self._tubes = chain_tubes([], [], 0.01)
+        self.update(character.vertices)
+        self.rest_box = self._box
+
+    def _vertex_arrays(self) -> dict[str, moderngl.VertexArray]:
+        position = (self._moving, "3f 12x", "in_position")
+        whole = (self._moving, "3f 3f", "in_position", "in_normal")
+        colour = (self._constant, "4f 8x", "in_colour")
+        image = (self._constant, "4f 2f", "in_colour", "in_uv")
+        buffers = {
+            "depth": [position],
+            "plain": [whole, colour],
+            "mirror": [whole, colour],
+            "textured": [whole, image],
+        }
+        return {
+            name: self._context.vertex_array(getattr(self._programs, name), content, self._indices)
+            for name, content in buffers.items()
+        }
+
+    def update(self, vertices: NDArray[np.float64]) -> None:
+        """Take the deformed welded vertices (N, 3) [m], in the character's stage coordinates.
+
+        Raises:
+            ValueError: the shape is not that of the character's vertices.
+        """
+        if vertices.shape != self._rest_shape:
+            raise ValueError(
+                f"Expected `vertices` to have shape {self._rest_shape}, got {vertices.shape}"
+            )
+        split, scratch = self._split, self._scratch
+        fill_draw_vertices(
+            np.ascontiguousarray(vertices, dtype=np.float64),
+            split.faces,
+            split.group_start,
+            split.group_corners,
+            split.welded,
+            split.group,
+            scratch.corner_normals,
+            scratch.group_normals,
+            scratch.out,
+        )
+        self._moving.orphan()
+        self._moving.write(scratch.out)
+        self._box = np.array([vertices.min(axis=0), vertices.max(axis=0)])
+
+    def highlight(self, chains: Sequence[ArrayLike], colours: Sequence[ArrayLike]) -> None:
+        """Light up polylines inside the surface; visible through it. No chains: none.
+
+        Args:
+            chains: each (K, 3) [m], in the character's stage coordinates.
+            colours: linear RGB of each chain.
+        """
+        height = float(np.ptp(self.rest_box, axis=0).max())
+        self._tubes = chain_tubes(chains, colours, 0.0095 * height)
+
+    @property
+    def tubes(self) -> NDArray[np.float32]:
+        """The highlighted chains as capsules (K, 13), in the character's coordinates."""
+        return self._tubes
+
+    @property
+    def box(self) -> NDArray[np.float64]:
+        """(2, 3) [m] least and greatest corner of what it fills now, on the stage."""
+        return self._box + self.position
+
+    @property
+    def pool(self) -> NDArray[np.float64]:
+        """(3,) x, z and radius [m] of the pool of light that it stands in."""
+        low, high = self.rest_box + self.position
+        half = (high - low)[[0, 2]] / 2.0
+        centre = (low + high)[[0, 2]] / 2.0
+        return np.array([*centre, max(0.62, float(half.max()) + 0.38)])
+
+    def draw_depth(self, to_clip: NDArray[np.float64]) -> None:
+        """Draw into a depth map whose clip space `to_clip` (4, 4) leads to."""
+        self._programs.depth["to_clip"].write(to_clip.T.astype("f4").tobytes())
+        self._programs.depth["offset"] = tuple(self.position)
+        self._arrays["depth"].render()
+
+    def draw_mirrored(self) -> None:
+        """Draw what the floor reflects."""
+        program = self._programs.mirror
+        program["offset"] = tuple(self.position)
+        for part in self._parts:
+            program["tint"] = part.mirror_tint
+            self._arrays["mirror"].render(vertices=part.count, first=part.first)
+
+    def draw(self) -> None:
+        """Draw the lit surface."""
+        for part in self._parts:
+            name = "plain" if part.image is None else "textured"
+            program = getattr(self._programs, name)
+            program["offset"] = tuple(self.position)
+            program["tint"] = part.tint
+            if part.image is not None:
+                part.image.use(1)
+            with _coverage(self._context, part.see_through):
+                self._arrays[name].render(vertices=part.count, first=part.first)
+
+    def release(self) -> None:
+        """Free its GL objects."""
+        for thing in (*self._arrays.values(), self._moving, self._constant, self._indices):
+            thing.release()
+        for part in self._parts:
+            if part.image is not None:
+                part.image.release()
+
+
+class _coverage:  # noqa: N801  (reads as a statement)
+    """Turns alpha into covered samples while drawing: see-through without sorting."""
+
+    def __init__(self, context: moderngl.Context, wanted: bool) -> None:
+        self._context = context
+        self._states = (0x809E, 0x809F) if wanted else ()  # ALPHA_TO_COVERAGE, ALPHA_TO_ONE
+
+    def __enter__(self) -> None:
+        for state in self._states:
+            self._context.enable_direct(state)
+
+    def __exit__(self, *_: object) -> None:
+        for state in self._states:
+            self._context.disable_direct(state)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Scratch:
+    corner_normals: NDArray[np.float32]
+    group_normals: NDArray[np.float32]
+    out: NDArray[np.float32]
+
+    @classmethod
+    def of(cls, split: DrawVertices) -> _Scratch:
+        return cls(
+            np.zeros((3 * len(split.faces), 3), dtype=np.float32),
+            np.zeros((max(len(split.group_start) - 1, 0), 3), dtype=np.float32),
+            np.zeros((len(split.welded), 6), dtype=np.float32),
+        )
+
+
+def _constant_attributes(character: Character, split: DrawVertices) -> bytes:
+    surface = character.surface
+    attributes = np.zeros((max(len(split.file), 1), 6), dtype=np.float32)
+    attributes[: len(split.file), :4] = surface.colors[split.file]
+    if surface.uvs is not None:
+        attributes[: len(split.file), 4:] = surface.uvs[split.file]
+    return attributes.tobytes()
+
+
+def _parts(
+    context: moderngl.Context, character: Character
+) -> tuple[list[_Part], NDArray[np.int64]]:
+    """Runs of triangles, one for each material in use, and the face order that makes them runs."""
+    surface = character.surface
+    order = np.argsort(surface.face_material, kind="stable")
+    used, first, count = np.unique(
+        surface.face_material[order], return_index=True, return_counts=True
+    )
+    faint = bool((surface.colors[:, 3] < 0.999).any())
+    parts = []
+    for index, start, faces in zip(used, first, count, strict=True):
+        material = surface.materials[index]
+        texture = material.texture if surface.uvs is not None else None
+        mean = np.ones(4)
+        see_through = faint or material.color[3] < 0.999
+        if texture is not None:
+            mean = _linear(np.asarray(texture)[::4, ::4].reshape(-1, 4)).mean(axis=0)
+            see_through |= bool((texture[..., 3] < 255).any())
+        parts.append(
+            _Part(
+                first=int(start) * 3,
+                count=int(faces) * 3,
+                tint=tuple(material.color.tolist()),
+                mirror_tint=tuple((material.color * mean).tolist()),
+                image=None if texture is None else _image(context, material),
+                see_through=bool(see_through),
+            )
+        )
+    return parts, order
+
+
+def _linear(colours: NDArray[np.uint8]) -> NDArray[np.float64]:
+    encoded = colours / 255.0
+    linear: NDArray[np.float64] = np.where(
+        encoded <= 0.04045, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4
+    )
+    linear[..., 3] = encoded[..., 3]
+    return linear
+
+
+def _image(context: moderngl.Context, material: Material) -> moderngl.Texture:
+    picture = Image.fromarray(np.ascontiguousarray(material.texture))
+    largest = min(int(context.info["GL_MAX_TEXTURE_SIZE"]), 4096)
+    picture.thumbnail((largest, largest))
+    texture = context.texture(picture.size, 4, picture.tobytes(), internal_format=SRGB8_ALPHA8)
+    texture.build_mipmaps()
+    texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
+    texture.anisotropy = min(4.0, context.max_anisotropy)
+    return texture

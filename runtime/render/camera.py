@@ -1,0 +1,147 @@
+"""A perspective camera that frames, orbits, pans and zooms."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Matrix = NDArray[np.float64]
+
+DEFAULT_PITCH = math.radians(9.0)
+HIGHEST_PITCH = math.radians(80.0)
+LOWEST_PITCH = math.radians(1.0)  # the eye stays above the floor
+
+
+@dataclass(frozen=True, slots=True)
+class Camera:
+    """Where the picture is taken from; right-handed, +Y up, the stage faces +Z.
+
+    Attributes:
+        eye: where it stands [m].
+        target: the point in the middle of the picture [m]; orbit turns about it.
+        fov: vertical angle of view [rad].
+        near, far: depth range [m].
+    """
+
+    eye: tuple[float, float, float] = (0.0, 1.5, 5.0)
+    target: tuple[float, float, float] = (0.0, 0.8, 0.0)
+    fov: float = math.radians(26.0)
+    near: float = 0.1
+    far: float = 100.0
+
+    @property
+    def distance(self) -> float:
+        """From eye to target [m]."""
+        return math.dist(self.eye, self.target)
+
+    @property
+    def view_rotation(self) -> Matrix:
+        """(3, 3) turns world directions into the camera's: x right, y up, z toward the viewer."""
+        back = np.subtract(self.eye, self.target) / self.distance
+        right = np.cross((0.0, 1.0, 0.0), back)
+        right /= np.linalg.norm(right)
+        return np.array([right, np.cross(back, right), back])
+
+    @property
+    def view(self) -> Matrix:
+        """(4, 4) takes world points to the camera's frame."""
+        matrix = np.eye(4)
+        matrix[:3, :3] = self.view_rotation
+        matrix[:3, 3] = -self.view_rotation @ np.asarray(self.eye)
+        return matrix
+
+    def projection(self, aspect: float) -> Matrix:
+        """(4, 4) OpenGL clip matrix for a picture `aspect` times as wide as high."""
+        scale = 1.0 / math.tan(self.fov / 2.0)
+        depth = self.near - self.far
+        matrix = np.zeros((4, 4))
+        matrix[0, 0] = scale / aspect
+        matrix[1, 1] = scale
+        matrix[2, 2:] = (self.far + self.near) / depth, 2.0 * self.far * self.near / depth
+        matrix[3, 2] = -1.0
+        return matrix
+
+    def frame(self, bounds: ArrayLike, aspect: float, *, margin: float = 0.12) -> Camera:
+        """Move, without turning, to where boxes just fill the picture less its margins.
+
+        A point (x, y, z) in the camera's axes lies inside the right edge of slope t, seen from
+        distance d with the centre at c, when d t + c >= x + z t; likewise for the left edge. The
+        largest of each over all corners give c and the smallest d in closed form.
+
+        Args:
+            bounds: (2, 3) or (B, 2, 3) [m]; least and greatest corners of one box or several.
+            aspect: width over height of the picture.
+            margin: free part of the picture on each side, in [0, 0.5).
+        """
+        corners = _corners(np.asarray(bounds, dtype=np.float64).reshape(-1, 2, 3))
+        seen = corners @ self.view_rotation.T  # (8 B, 3)
+        slope_y = math.tan(self.fov / 2.0) * (1.0 - 2.0 * margin)
+        centre_x, distance_x = _tightest(seen[:, 0], seen[:, 2], slope_y * aspect)
+        centre_y, distance_y = _tightest(seen[:, 1], seen[:, 2], slope_y)
+        nearest, middle = seen[:, 2].max(), (seen[:, 2].max() + seen[:, 2].min()) / 2.0
+        depth = max(distance_x, distance_y, nearest + 1e-3)
+        rotation = self.view_rotation
+        target = np.array([centre_x, centre_y, middle]) @ rotation
+        eye = np.array([centre_x, centre_y, depth]) @ rotation
+        return _placed(self, eye, target)
+
+    def orbit(self, yaw: float, pitch: float) -> Camera:
+        """Turn about the target by angles [rad]: yaw to the right, pitch upward."""
+        back = np.subtract(self.eye, self.target) / self.distance
+        azimuth = math.atan2(back[0], back[2]) + yaw
+        height = min(max(math.asin(back[1]) + pitch, LOWEST_PITCH), HIGHEST_PITCH)
+        return _placed(
+            self, np.asarray(self.target) + self.distance * _toward(azimuth, height), self.target
+        )
+
+    def pan(self, right: float, up: float) -> Camera:
+        """Shift eye and target together, in heights of the picture at the target."""
+        height = 2.0 * self.distance * math.tan(self.fov / 2.0)
+        shift = height * (right * self.view_rotation[0] + up * self.view_rotation[1])
+        return _placed(self, np.add(self.eye, shift), np.add(self.target, shift))
+
+    def zoom(self, factor: float) -> Camera:
+        """Bring the target `factor` times closer."""
+        distance = min(max(self.distance / factor, 0.05), 500.0)
+        back = np.subtract(self.eye, self.target) / self.distance
+        return _placed(self, np.asarray(self.target) + distance * back, self.target)
+
+
+def front_camera(*, pitch: float = DEFAULT_PITCH, fov: float = math.radians(26.0)) -> Camera:
+    """Straight from the front, slightly raised: the view in which a performer is matched."""
+    target = np.array([0.0, 0.8, 0.0])
+    return _placed(Camera(fov=fov), target + 5.0 * _toward(0.0, pitch), target)
+
+
+def _toward(azimuth: float, height: float) -> NDArray[np.float64]:
+    level = math.cos(height)
+    return np.array([math.sin(azimuth) * level, math.sin(height), math.cos(azimuth) * level])
+
+
+def _placed(camera: Camera, eye: ArrayLike, target: ArrayLike) -> Camera:
+    distance = math.dist(np.asarray(eye), np.asarray(target))
+    return replace(
+        camera,
+        eye=tuple(np.asarray(eye, dtype=np.float64).tolist()),
+        target=tuple(np.asarray(target, dtype=np.float64).tolist()),
+        near=distance * 0.02,
+        far=distance * 20.0,
+    )
+
+
+def _corners(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The eight corners of each box (B, 2, 3) as points (8 B, 3)."""
+    pick = np.array(list(np.ndindex(2, 2, 2)))  # (8, 3)
+    return boxes[:, pick, np.arange(3)].reshape(-1, 3)
+
+
+def _tightest(
+    offset: NDArray[np.float64], depth: NDArray[np.float64], slope: float
+) -> tuple[float, float]:
+    """Centre and distance from which points just touch both edges of a wedge."""
+    greatest = float((offset + depth * slope).max())
+    least = float((-offset + depth * slope).max())
+    return (greatest - least) / 2.0, (greatest + least) / (2.0 * slope)

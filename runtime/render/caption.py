@@ -1,0 +1,66 @@
+"""The actors' names, set in small letters on the edge of the stage."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image, ImageDraw, ImageFont
+
+from runtime.render.programs import link
+
+INK = (0.93, 0.80, 0.60, 0.78)  # encoded sRGB and opacity: old ivory
+LONGEST = 40
+
+
+class CaptionPainter:
+    """Draws short names below points of the picture; keeps the letters it has set."""
+
+    def __init__(self, context: moderngl.Context) -> None:
+        self._context = context
+        self._program = link(context, "caption", "caption")
+        self._array = context.vertex_array(self._program, [])
+        self._set: dict[tuple[str, int], moderngl.Texture] = {}
+
+    def draw(self, text: str, at: tuple[float, float], target: moderngl.Framebuffer) -> None:
+        """Draw `text` centred on and just below the pixel `at` (from the lower left)."""
+        width, height = target.size
+        points = max(round(height * 0.026), 8)
+        letters = self._letters(text[:LONGEST], points)
+        left = round(at[0] - letters.width / 2)
+        bottom = max(round(at[1] - letters.height), 2)
+        box = np.array([left, bottom, left + letters.width, bottom + letters.height], dtype=float)
+        clip = box / [width, height, width, height] * 2.0 - 1.0
+        self._program["box"] = tuple(clip)
+        self._program["ink"] = INK
+        letters.use(0)
+        self._array.render(moderngl.TRIANGLE_STRIP, vertices=4)
+
+    def _letters(self, text: str, points: int) -> moderngl.Texture:
+        key = (text, points)
+        if key not in self._set:
+            pixels = _typeset(text, points)
+            texture = self._context.texture(pixels.shape[::-1], 1, pixels.tobytes(), alignment=1)
+            texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
+            self._set[key] = texture
+        return self._set[key]
+
+    def release(self) -> None:
+        """Free its GL objects."""
+        for thing in (self._array, self._program, *self._set.values()):
+            thing.release()
+
+
+def _typeset(text: str, points: int) -> NDArray[np.uint8]:
+    """Spaced letters (h, w), 255 where there is ink; Pillow's own font, so alike everywhere."""
+    font = ImageFont.load_default(points)
+    spacing = points * 0.10
+    shown = text or " "
+    width = sum(font.getlength(letter) + spacing for letter in shown)
+    picture = Image.new("L", (int(width) + 4, int(points * 1.5)), 0)
+    pen = ImageDraw.Draw(picture)
+    x = 2.0
+    for letter in shown:
+        pen.text((x, points * 0.1), letter, fill=255, font=font)
+        x += font.getlength(letter) + spacing
+    return np.asarray(picture)

@@ -1,0 +1,90 @@
+"""OpenGL 3.3 contexts: one without a screen (EGL), one over a window's."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+
+import moderngl
+
+from devices.errors import InputError
+
+INSTALL_HINT = "on Debian or Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri"
+EGL_DEVICES = 4  # a machine lists its GPUs first and Mesa's software device last
+
+
+def headless_context(*, libegl: str = "libEGL.so.1", libgl: str = "libGL.so.1") -> moderngl.Context:
+    """An OpenGL 3.3 core context that needs no display, on a GPU or on Mesa's llvmpipe.
+
+    Linux asks EGL by the names that a plain Debian has; Windows and macOS use their own hidden
+    window. EGL devices that refuse (no permission, no driver) are passed over for the next one.
+
+    Raises:
+        InputError: there is no EGL, GL or driver; the message says what to install.
+    """
+    if not sys.platform.startswith("linux"):
+        return _other_platform()
+    refusals = []
+    for device in range(EGL_DEVICES):
+        try:
+            context = moderngl.create_context(
+                standalone=True, backend="egl", libegl=libegl, libgl=libgl, device_index=device
+            )
+        except Exception as error:  # glcontext raises bare Exception for every failure
+            refusals.append(str(error))
+        else:
+            return context
+    raise InputError(
+        f"headless rendering could not start OpenGL 3.3 through EGL ({refusals[0]}); {INSTALL_HINT}"
+    )
+
+
+def _other_platform() -> moderngl.Context:
+    try:
+        return moderngl.create_context(standalone=True)
+    except Exception as error:  # glcontext raises bare Exception for every failure
+        raise InputError(
+            f"headless rendering could not start OpenGL 3.3 ({error}); update the graphics driver"
+        ) from error
+
+
+class _Loader:
+    """Finds GL functions through the library that made the current context."""
+
+    def __init__(self, address_of: Callable[[str], int | None]) -> None:
+        self._address_of = address_of
+
+    def load_opengl_function(self, name: str) -> int:
+        return self._address_of(name) or 0
+
+    def release(self) -> None:
+        """The window owns the context and ends it."""
+
+
+def current_context(address_of: Callable[[str], int | None]) -> moderngl.Context:
+    """Wrap the GL context that is current on this thread; `address_of` looks functions up.
+
+    Raises:
+        InputError: the current context is older than OpenGL 3.3.
+    """
+    try:
+        return moderngl.create_context(context=_Loader(address_of))
+    except Exception as error:  # moderngl raises bare Exception for every failure
+        raise InputError(
+            f"the window's OpenGL is not usable ({error}); Bunraku needs OpenGL 3.3: "
+            "update the graphics driver or add --headless"
+        ) from error
+
+
+def renderer_name(context: moderngl.Context) -> str:
+    """What draws, as the driver calls it, in one line."""
+    with suppress(KeyError):
+        return f"{context.info['GL_RENDERER']}, OpenGL {context.info['GL_VERSION']}"
+    return "unknown renderer"
+
+
+def is_software(context: moderngl.Context) -> bool:
+    """Whether a processor draws instead of a GPU."""
+    name = renderer_name(context).lower()
+    return any(word in name for word in ("llvmpipe", "softpipe", "swrast", "software"))

@@ -1,0 +1,105 @@
+"""Shadow map, contact shadows and reflections of the actors on the stage floor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from runtime.render.actor import Actor
+from runtime.render.frame import SHADOW_SIZE, Lighting
+from runtime.render.programs import link
+
+MASK_SIZE = (384, 256)
+HEIGHT_SIZE = (256, 256)
+REFLECTION_REACH = 0.9  # how far in front of an actor the floor may still show it [m]
+
+
+class ShadowMaps:
+    """What the key light sees and what the floor sees of the actors."""
+
+    def __init__(self, context: moderngl.Context) -> None:
+        self.key = context.depth_texture((SHADOW_SIZE, SHADOW_SIZE))
+        self.key.compare_func = "<="
+        self.key.filter = (moderngl.LINEAR, moderngl.LINEAR)
+        self.key.repeat_x = self.key.repeat_y = False
+        self.height = context.depth_texture(HEIGHT_SIZE)
+        self.height.compare_func = ""
+        self.height.filter = (moderngl.LINEAR, moderngl.LINEAR)
+        self.height.repeat_x = self.height.repeat_y = False
+        self._key_target = context.framebuffer(depth_attachment=self.key)
+        self._height_target = context.framebuffer(depth_attachment=self.height)
+
+    def draw(self, actors: Sequence[Actor], light: Lighting, *, contact: bool) -> None:
+        """Draw the actors' depth; the view from below only where there is a floor."""
+        self._pass(self._key_target, actors, light.to_shadow_clip)
+        if contact:
+            self._pass(self._height_target, actors, light.to_height_clip)
+
+    @staticmethod
+    def _pass(
+        target: moderngl.Framebuffer, actors: Sequence[Actor], to_clip: NDArray[np.float64]
+    ) -> None:
+        target.use()
+        target.clear(depth=1.0)
+        for actor in actors:
+            actor.draw_depth(to_clip)
+
+    def release(self) -> None:
+        """Free its GL objects."""
+        for thing in (self._key_target, self._height_target, self.key, self.height):
+            thing.release()
+
+
+class Floor:
+    """Lays shadows, contact shadows and reflections over the backdrop's boards."""
+
+    def __init__(self, context: moderngl.Context) -> None:
+        self._context = context
+        self._mask_program = link(context, "whole", "floor_mask")
+        self._mask_program["shadow_map"] = 0
+        self._mask_program["height_map"] = 1
+        self._mask_array = context.vertex_array(self._mask_program, [])
+        self._mask = context.texture(MASK_SIZE, 4)
+        self._mask.repeat_x = self._mask.repeat_y = False
+        self._mask_target = context.framebuffer(self._mask)
+        self._program = link(context, "floor", "floor")
+        self._program["floor_mask"] = 0
+        self._program["reflection"] = 1
+        self._program["reach"] = REFLECTION_REACH
+        self._array = context.vertex_array(self._program, [])
+
+    def draw_mask(self, maps: ShadowMaps) -> None:
+        """Work out, for each point of the floor, how much light the actors leave it."""
+        self._mask_target.use()
+        maps.key.use(0)
+        maps.height.use(1)
+        self._mask_array.render(moderngl.TRIANGLES, vertices=3)
+
+    def draw(self, target: moderngl.Framebuffer, reflection: moderngl.Texture) -> None:
+        """Darken and add to `target`, which holds the backdrop."""
+        target.use()
+        self._mask.use(0)
+        reflection.use(1)
+        self._context.enable_only(moderngl.BLEND)
+        self._context.blend_func = (
+            moderngl.ONE,
+            moderngl.SRC_ALPHA,
+            moderngl.ZERO,
+            moderngl.ONE,
+        )
+        self._array.render(moderngl.TRIANGLE_STRIP, vertices=4)
+
+    def release(self) -> None:
+        """Free its GL objects."""
+        for thing in (
+            self._array,
+            self._program,
+            self._mask_target,
+            self._mask,
+            self._mask_array,
+            self._mask_program,
+        ):
+            thing.release()

@@ -1,0 +1,140 @@
+"""What every pass of one frame shares: camera, key light, floor and pools of light."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from runtime.render.camera import Camera
+
+Box = NDArray[np.float64]  # (2, 3) least and greatest corner [m]
+
+MAX_POOLS = 16
+KEY_DIRECTION = np.array([-0.46, 0.92, 0.66]) / np.linalg.norm([-0.46, 0.92, 0.66])
+
+FRAME = np.dtype(
+    [
+        ("view_projection", "f4", (4, 4)),  # matrices are stored by columns, as GLSL has them
+        ("inverse_view_projection", "f4", (4, 4)),
+        ("light", "f4", (4, 4)),
+        ("eye", "f4", 4),
+        ("key", "f4", 4),
+        ("floor_area", "f4", 4),
+        ("stage", "f4", 4),
+        ("picture", "f4", 4),
+        ("pools", "f4", (MAX_POOLS, 4)),
+    ]
+)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Lighting:
+    """Where the light falls for the boxes that the actors fill now.
+
+    Attributes:
+        to_shadow_clip: (4, 4) world to the clip space of the shadow map.
+        to_height_clip: (4, 4) world to the clip space of the map seen from below the floor.
+        floor: (4,) least x, least z, width and depth [m] of the floor that shadows reach.
+        texel: size of one texel of the shadow map [m].
+    """
+
+    to_shadow_clip: NDArray[np.float64]
+    to_height_clip: NDArray[np.float64]
+    floor: NDArray[np.float64]
+    texel: float
+
+
+CONTACT_HEIGHT = 0.32  # what hangs higher than this above the floor leaves no contact shadow [m]
+SHADOW_SIZE = 1024
+
+
+def lighting(boxes: NDArray[np.float64]) -> Lighting:
+    """Fit shadow and height maps around boxes (B, 2, 3).
+
+    Extents are rounded outward to whole steps, so that the maps stand still while actors move
+    within them and shadows do not shimmer.
+    """
+    pick = np.array(list(np.ndindex(2, 2, 2)))
+    corners = boxes[:, pick, np.arange(3)].reshape(-1, 3)
+    landing = corners - KEY_DIRECTION * (corners[:, 1:2] / KEY_DIRECTION[1])
+    reach = np.vstack([corners, landing])
+    axes = _light_axes()
+    low, high = _rounded(reach @ axes.T, 0.125)
+    to_light = np.eye(4)
+    to_light[:3, :3] = axes
+    floor_low, floor_high = _rounded(reach[:, [0, 2]] + 0.0, 0.25)
+    floor_low, floor_high = floor_low - 0.25, floor_high + 0.25
+    below = np.array([[1.0, 0, 0, 0], [0, 0, 1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]])
+    return Lighting(
+        to_shadow_clip=_box_to_clip(low, high, near_is_high=True) @ to_light,
+        to_height_clip=_box_to_clip(
+            np.array([*floor_low, -0.05]), np.array([*floor_high, CONTACT_HEIGHT])
+        )
+        @ below,
+        floor=np.concatenate([floor_low, floor_high - floor_low]),
+        texel=float((high - low)[:2].max() / SHADOW_SIZE),
+    )
+
+
+def _light_axes() -> NDArray[np.float64]:
+    right = np.cross((0.0, 1.0, 0.0), KEY_DIRECTION)
+    right /= np.linalg.norm(right)
+    return np.array([right, np.cross(KEY_DIRECTION, right), KEY_DIRECTION])
+
+
+def _rounded(
+    points: NDArray[np.float64], step: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    low = np.floor(points.min(axis=0) / step - 0.1) * step
+    high = np.ceil(points.max(axis=0) / step + 0.1) * step
+    return low, high
+
+
+def _box_to_clip(
+    low: NDArray[np.float64], high: NDArray[np.float64], *, near_is_high: bool = False
+) -> NDArray[np.float64]:
+    matrix = np.diag(np.append(2.0 / (high - low), 1.0))
+    matrix[:3, 3] = -(high + low) / (high - low)
+    if near_is_high:
+        matrix[2] *= (-1.0, -1.0, -1.0, -1.0)
+    return matrix
+
+
+def frame_block(
+    camera: Camera,
+    size: tuple[int, int],
+    light: Lighting,
+    pools: NDArray[np.float64],
+    *,
+    on_floor: bool,
+    mirrored: bool = False,
+) -> NDArray[np.void]:
+    """The uniform block of one frame; `mirrored` is the picture that the floor reflects.
+
+    Args:
+        camera: where the picture is taken from.
+        size: width and height of the picture [px].
+        light: as `lighting` fits it.
+        pools: (P, 3) x, z and radius [m] of each pool of light.
+        on_floor: whether there is a floor, which hides what lies below it.
+    """
+    width, height = size
+    flip = np.diag([1.0, -1.0 if mirrored else 1.0, 1.0, 1.0])
+    view_projection = camera.projection(width / height) @ camera.view @ flip
+    half = np.eye(4) * (0.5, 0.5, 0.5, 1.0)
+    half[:3, 3] = 0.5, 0.5, 0.4985  # a little nearer to the light: no surface shades itself
+    low, high = pools[:, :2].min(axis=0), pools[:, :2].max(axis=0)
+    block = np.zeros((), dtype=FRAME)
+    block["view_projection"] = view_projection.T
+    block["inverse_view_projection"] = np.linalg.inv(view_projection).T
+    block["light"] = (half @ light.to_shadow_clip).T
+    block["eye"] = (*(flip[:3, :3] @ np.asarray(camera.eye)), -1.0 if mirrored else 1.0)
+    block["key"] = (*KEY_DIRECTION, float(on_floor))
+    block["floor_area"] = (*light.floor[:2], *(1.0 / light.floor[2:]))
+    radius = max(3.6, 0.62 * float((high - low).max()) + 2.6)
+    block["stage"] = (*((low + high) / 2.0), radius, len(pools))
+    block["picture"] = (width, height, height / (2.0 * np.tan(camera.fov / 2.0)), 0.0)
+    block["pools"][: len(pools), :3] = pools
+    return block

@@ -1,0 +1,159 @@
+"""Normals of a deforming surface: smooth across seams of the file, sharp at creases of the shape."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
+
+from runtime.character import Character
+
+CREASE = math.radians(62.0)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class DrawVertices:
+    """What is drawn, split where the file has a seam or the rest shape a crease.
+
+    Attributes:
+        welded: (D,) int32; welded vertex that each drawn vertex follows.
+        file: (D,) int64; file vertex that it takes colour and texture coordinates from.
+        group: (D,) int32; smoothing group that it takes its normal from.
+        triangles: (F, 3) int32 into the D drawn vertices, in the character's face order.
+        faces: (F, 3) int32 into the welded vertices.
+        group_start: (G + 1,) int32; group g is the corners `group_corners[start[g]:start[g + 1]]`.
+        group_corners: (3 F,) int32; corner 3 f + k is the k-th of face f.
+    """
+
+    welded: NDArray[np.int32]
+    file: NDArray[np.int64]
+    group: NDArray[np.int32]
+    triangles: NDArray[np.int32]
+    faces: NDArray[np.int32]
+    group_start: NDArray[np.int32]
+    group_corners: NDArray[np.int32]
+
+
+def split_vertices(character: Character, *, crease: float = CREASE) -> DrawVertices:
+    """Split a character's vertices for drawing; edges that turn by more than `crease` stay sharp."""
+    faces = np.ascontiguousarray(character.faces, dtype=np.int32)
+    group = smoothing_groups(character.vertices, faces, crease)
+    surface = character.surface
+    file = np.asarray(surface.faces, dtype=np.int64).reshape(-1)
+    key = file * (int(group.max(initial=0)) + 1) + group
+    _, first, triangles = np.unique(key, return_index=True, return_inverse=True)
+    corners = np.argsort(group, kind="stable").astype(np.int32)
+    sizes = np.bincount(group)
+    return DrawVertices(
+        welded=surface.vertex[file[first]].astype(np.int32),
+        file=file[first],
+        group=group[first],
+        triangles=triangles.reshape(-1, 3).astype(np.int32),
+        faces=faces,
+        group_start=np.concatenate([[0], np.cumsum(sizes)]).astype(np.int32),
+        group_corners=corners,
+    )
+
+
+def smoothing_groups(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32], crease: float
+) -> NDArray[np.int32]:
+    """Group number of each corner (3 F,): corners at one vertex joined across its smooth edges.
+
+    Faces that share an edge but run around it the same way disagree about inside and outside;
+    their normals would cancel, so that edge counts as sharp.
+    """
+    count = len(faces)
+    corner = np.arange(3 * count).reshape(-1, 3)
+    tail, head = faces, np.roll(faces, -1, axis=1)
+    first, second = corner, np.roll(corner, -1, axis=1)  # corners at tail and head
+    low, high = np.minimum(tail, head), np.maximum(tail, head)
+    order = np.lexsort((high.ravel(), low.ravel()))
+    a, b = order[:-1], order[1:]
+    same = (low.ravel()[a] == low.ravel()[b]) & (high.ravel()[a] == high.ravel()[b])
+    opposite = tail.ravel()[a] != tail.ravel()[b]
+    normals, area = _unit_face_normals(vertices, faces)
+    turn = np.einsum("ij,ij->i", normals[a // 3], normals[b // 3])
+    flat = (area[a // 3] == 0.0) | (area[b // 3] == 0.0)
+    joined = same & opposite & (flat | (turn >= math.cos(crease)))
+    a, b = a[joined], b[joined]
+    rows = np.concatenate([first.ravel()[a], second.ravel()[a]])
+    columns = np.concatenate([second.ravel()[b], first.ravel()[b]])
+    links = coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), (3 * count,) * 2)
+    labels: NDArray[np.int32] = connected_components(links, directed=False)[1]
+    return labels.astype(np.int32)
+
+
+def _unit_face_normals(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    cross = np.cross(b - a, c - a)
+    length = np.linalg.norm(cross, axis=1)
+    return cross / np.maximum(length, 1e-300)[:, None], length
+
+
+@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def fill_draw_vertices(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    group_start: NDArray[np.int32],
+    group_corners: NDArray[np.int32],
+    welded: NDArray[np.int32],
+    group: NDArray[np.int32],
+    corner_normals: NDArray[np.float32],
+    group_normals: NDArray[np.float32],
+    out: NDArray[np.float32],
+) -> None:
+    """Write position and unit normal of each drawn vertex into `out` (D, 6).
+
+    A group's normal is the sum of its faces' unit normals weighted by the angle at the corner
+    (Thurmer and Wuthrich 1998), which does not depend on how the surface was triangulated. Sums
+    run in a fixed order, so that two runs agree to the last bit.
+    """
+    for f in range(faces.shape[0]):
+        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
+        ux, uy, uz = (vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1],
+                      vertices[b, 2] - vertices[a, 2])  # fmt: skip
+        vx, vy, vz = (vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1],
+                      vertices[c, 2] - vertices[a, 2])  # fmt: skip
+        nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        double_area = math.sqrt(nx * nx + ny * ny + nz * nz)
+        if double_area == 0.0:
+            corner_normals[3 * f : 3 * f + 3] = 0.0
+            continue
+        uv, uu, vv = (
+            ux * vx + uy * vy + uz * vz,
+            ux * ux + uy * uy + uz * uz,
+            vx * vx + vy * vy + vz * vz,
+        )
+        at_a = math.atan2(double_area, uv)
+        at_b = math.atan2(double_area, uu - uv)
+        for k in range(3):
+            angle = at_a if k == 0 else at_b if k == 1 else math.pi - at_a - at_b
+            weight = angle / double_area
+            corner_normals[3 * f + k, 0] = nx * weight
+            corner_normals[3 * f + k, 1] = ny * weight
+            corner_normals[3 * f + k, 2] = nz * weight
+    for g in range(group_start.shape[0] - 1):
+        x = y = z = 0.0
+        for i in range(group_start[g], group_start[g + 1]):
+            corner = group_corners[i]
+            x += corner_normals[corner, 0]
+            y += corner_normals[corner, 1]
+            z += corner_normals[corner, 2]
+        length = max(math.sqrt(x * x + y * y + z * z), 1e-30)
+        group_normals[g, 0], group_normals[g, 1], group_normals[g, 2] = (
+            x / length,
+            y / length,
+            z / length,
+        )
+    for d in range(welded.shape[0]):
+        for axis in range(3):
+            out[d, axis] = vertices[welded[d], axis]
+            out[d, 3 + axis] = group_normals[group[d], axis]

@@ -1,0 +1,261 @@
+"""The puppet stage: actors under a warm key and cool rims, in a dark house, on a boarded floor."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from devices.errors import InputError
+from runtime.character import Character
+from runtime.render.actor import Actor, ActorPrograms
+from runtime.render.camera import Camera
+from runtime.render.caption import CaptionPainter
+from runtime.render.floor import Floor, ShadowMaps
+from runtime.render.frame import MAX_POOLS, Lighting, frame_block, lighting
+from runtime.render.inset import InsetPainter, SkeletonInset
+from runtime.render.programs import FRAME_BINDING, link
+from runtime.render.targets import Targets
+from runtime.render.tubes import TubePainter
+
+CLIP_DISTANCE0 = 0x3000
+OVER = (moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)
+
+
+class Stage:
+    """Draws actors into a picture of its own, for a window and for files alike.
+
+    One path: shadow and contact maps, the actors with multisampling, then backdrop, floor, actors,
+    chains, captions and inset laid over one another in the display's encoding. The backdrop is
+    kept while camera and pools of light stand still.
+
+    Args:
+        context: an OpenGL 3.3 context, current on this thread.
+        size: width and height of the picture [px].
+        samples: samples a pixel on the actors' edges; fewer where the driver has fewer.
+        transparent: no house and no floor; `read` gives straight alpha.
+    """
+
+    def __init__(
+        self,
+        context: moderngl.Context,
+        size: tuple[int, int],
+        *,
+        samples: int = 4,
+        transparent: bool = False,
+    ) -> None:
+        self._context = context
+        self._samples = min(samples, context.max_samples)
+        self._transparent = transparent
+        self._actors: list[Actor] = []
+        self._captions: dict[int, str] = {}
+        self._programs = ActorPrograms(
+            depth=link(context, "depth", "depth"),
+            plain=link(context, "character", "character"),
+            textured=link(context, "character", "character", defines=("TEXTURED",)),
+            mirror=link(context, "character", "mirror"),
+        )
+        self._programs.textured["image"] = 1
+        self._maps = ShadowMaps(context)
+        self._floor = Floor(context)
+        self._tubes = TubePainter(context)
+        self._inset = InsetPainter(context)
+        self._caption = CaptionPainter(context)
+        self._backdrop_program = link(context, "whole", "backdrop")
+        self._backdrop_array = context.vertex_array(self._backdrop_program, [])
+        self._lay_program = link(context, "whole", "resolved")
+        self._lay_array = context.vertex_array(self._lay_program, [])
+        block = frame_block(Camera(), size, lighting(_EMPTY), _NO_POOLS, on_floor=False)
+        self._frame = context.buffer(reserve=block.nbytes, dynamic=True)
+        self._mirrored = context.buffer(reserve=block.nbytes, dynamic=True)
+        self._targets = self._make_targets(size)
+        self._kept_backdrop = b""
+
+    def _make_targets(self, size: tuple[int, int]) -> Targets:
+        largest = min(int(self._context.info["GL_MAX_TEXTURE_SIZE"]), 16384)
+        if not (0 < size[0] <= largest and 0 < size[1] <= largest):
+            raise InputError(
+                f"a picture of {size[0]}x{size[1]} pixels cannot be drawn here; "
+                f"choose a --size from 1x1 to {largest}x{largest}"
+            )
+        return Targets(self._context, (int(size[0]), int(size[1])), self._samples)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the picture [px]."""
+        return self._targets.size
+
+    @property
+    def aspect(self) -> float:
+        """Width over height."""
+        return self.size[0] / self.size[1]
+
+    @property
+    def boxes(self) -> NDArray[np.float64]:
+        """(A, 2, 3) [m] what each actor fills now: least and greatest corner, for `Camera.frame`."""
+        return np.array([actor.box for actor in self._actors]).reshape(-1, 2, 3)
+
+    def add(
+        self,
+        character: Character,
+        *,
+        position: ArrayLike = (0.0, 0.0, 0.0),
+        caption: str = "",
+    ) -> Actor:
+        """Put a character on the stage, in its rest pose, in a pool of light of its own.
+
+        Args:
+            character: what to draw.
+            position: (3,) [m] where its origin stands.
+            caption: a name shown at its feet, or nothing.
+
+        Raises:
+            InputError: the stage has as many actors as it can light.
+        """
+        if len(self._actors) == MAX_POOLS:
+            raise InputError(f"a stage holds {MAX_POOLS} characters at most")
+        actor = Actor(self._context, self._programs, character, position)
+        self._actors.append(actor)
+        self._captions[id(actor)] = caption
+        return actor
+
+    def remove(self, actor: Actor) -> None:
+        """Take an actor off the stage and free what it holds."""
+        self._actors.remove(actor)
+        del self._captions[id(actor)]
+        actor.release()
+
+    def resize(self, size: tuple[int, int]) -> None:
+        """Draw pictures of another size from now on."""
+        if tuple(size) != self.size:
+            self._targets.release()
+            self._targets = self._make_targets(size)
+            self._kept_backdrop = b""
+
+    def draw(self, camera: Camera, inset: SkeletonInset | None = None) -> None:
+        """Draw the actors as they are now, seen by `camera`; `inset` shows the performer."""
+        light = lighting(self.boxes if self._actors else _EMPTY)
+        pools = np.array([actor.pool for actor in self._actors]) if self._actors else _NO_POOLS
+        self._share(camera, light, pools)
+        self._context.enable_only(moderngl.DEPTH_TEST)
+        self._maps.draw(self._actors, light, contact=not self._transparent)
+        self._draw_actors(light)
+        if self._transparent:
+            self._targets.picture.clear()
+        else:
+            self._draw_house(camera, pools)
+        self._lay_over(camera, inset)
+
+    def _share(self, camera: Camera, light: Lighting, pools: NDArray[np.float64]) -> None:
+        for buffer, mirrored in ((self._frame, False), (self._mirrored, True)):
+            block = frame_block(
+                camera,
+                self.size,
+                light,
+                pools,
+                on_floor=not self._transparent,
+                mirrored=mirrored,
+            )
+            buffer.orphan()
+            buffer.write(block.tobytes())
+        self._frame.bind_to_uniform_block(FRAME_BINDING)
+
+    def _draw_actors(self, light: Lighting) -> None:
+        for program in (self._programs.plain, self._programs.textured):
+            program["shadow_texel"] = 1.8 * light.texel
+        self._maps.key.use(0)
+        self._targets.actors.use()
+        self._targets.actors.clear()
+        self._context.enable_direct(CLIP_DISTANCE0)
+        for actor in self._actors:
+            actor.draw()
+        self._context.disable_direct(CLIP_DISTANCE0)
+        self._context.copy_framebuffer(self._targets.resolved, self._targets.actors)
+
+    def _draw_house(self, camera: Camera, pools: NDArray[np.float64]) -> None:
+        self._mirrored.bind_to_uniform_block(FRAME_BINDING)
+        self._targets.reflection.use()
+        self._targets.reflection.clear()
+        self._context.enable_direct(CLIP_DISTANCE0)
+        for actor in self._actors:
+            actor.draw_mirrored()
+        self._context.disable_direct(CLIP_DISTANCE0)
+        self._frame.bind_to_uniform_block(FRAME_BINDING)
+        self._context.disable(moderngl.DEPTH_TEST)
+        wanted = repr(camera).encode() + pools.tobytes()
+        if wanted != self._kept_backdrop:
+            self._targets.backdrop.use()
+            self._backdrop_array.render(moderngl.TRIANGLES, vertices=3)
+            self._kept_backdrop = wanted
+        self._context.copy_framebuffer(self._targets.picture, self._targets.backdrop)
+        self._floor.draw_mask(self._maps)
+        self._floor.draw(self._targets.picture, self._targets.reflection_image)
+
+    def _lay_over(self, camera: Camera, inset: SkeletonInset | None) -> None:
+        picture = self._targets.picture
+        picture.use()
+        self._context.enable_only(moderngl.BLEND)
+        self._context.blend_func = OVER
+        self._targets.resolved_image.use(0)
+        self._lay_array.render(moderngl.TRIANGLES, vertices=3)
+        width, height = self.size
+        to_clip = camera.projection(self.aspect) @ camera.view
+        pixels = height / (2.0 * np.tan(camera.fov / 2.0))
+        for actor in self._actors:
+            self._tubes.draw(
+                actor.tubes, to_clip, size=self.size, pixels=pixels, offset=actor.position
+            )
+        for actor in self._actors:
+            caption = self._captions[id(actor)]
+            if caption:
+                low, high = actor.rest_box + actor.position
+                foot = to_clip @ [(low[0] + high[0]) / 2.0, 0.0, high[2] + 0.16, 1.0]
+                at = (foot[:2] / foot[3] * 0.5 + 0.5) * [width, height]
+                self._caption.draw(caption, (float(at[0]), float(at[1])), picture)
+        if inset is not None:
+            self._inset.draw(inset, self._tubes, picture)
+
+    def show(self, target: moderngl.Framebuffer) -> None:
+        """Copy the picture to a window's framebuffer of the same size."""
+        self._context.copy_framebuffer(target, self._targets.picture)
+
+    def read(self) -> NDArray[np.uint8]:
+        """The picture (H, W, 4): sRGB with straight alpha, top row first."""
+        width, height = self.size
+        data = self._targets.picture.read(components=4, alignment=1)
+        pixels = np.frombuffer(data, dtype=np.uint8).reshape(height, width, 4)[::-1].copy()
+        if not self._transparent:
+            pixels[..., 3] = 255
+            return pixels
+        alpha = pixels[..., 3:].astype(np.uint16)
+        straight = (pixels[..., :3] * np.uint16(255) + alpha // 2) // np.maximum(alpha, 1)
+        pixels[..., :3] = np.minimum(straight, 255)
+        return pixels
+
+    def release(self) -> None:
+        """Free everything on the GPU; the stage cannot be used after."""
+        for actor in list(self._actors):
+            self.remove(actor)
+        for thing in (
+            self._targets,
+            self._maps,
+            self._floor,
+            self._tubes,
+            self._inset,
+            self._caption,
+            self._backdrop_array,
+            self._backdrop_program,
+            self._lay_array,
+            self._lay_program,
+            self._frame,
+            self._mirrored,
+            self._programs.depth,
+            self._programs.plain,
+            self._programs.textured,
+            self._programs.mirror,
+        ):
+            thing.release()
+
+
+_EMPTY = np.array([[[-0.5, 0.0, -0.5], [0.5, 1.5, 0.5]]])
+_NO_POOLS = np.array([[0.0, 0.0, 0.9]])
