@@ -1,0 +1,100 @@
+"""The local step, the global step's right-hand side, and the energy, as compiled kernels.
+
+Positions x (N, 3), rotations (N, 9) row-major; the cells' arrays are those of `solvers.arap_cells`.
+Free vertices come first; the rest are handles. Every kernel gives the same bits for any number of
+threads: blocks of vertices are independent, and sums are taken in one order.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import prange
+
+from solvers.arap_cells import Cells, Terms
+from solvers.compiled import parallel_kernel
+from solvers.laplacian import Floats
+from solvers.rotation_fit import LANES, SCRATCH, fit_rotations
+
+_R = 9 * LANES
+
+
+@parallel_kernel
+def fit_cells(x: Floats, cells: Cells, R: Floats, laplace_x: Floats) -> None:
+    """The local step: each cell's best rotation into R; L x into laplace_x on the way.
+
+    Source: Sorkine and Alexa 2007, eqs. (5) and (6).
+    """
+    starts, neighbours, fits = cells.starts, cells.neighbours, cells.fits
+    count = len(starts) - 1
+    for block in prange((count + LANES - 1) // LANES):
+        lanes = np.empty(SCRATCH)
+        first = block * LANES
+        size = min(LANES, count - first)
+        for k in range(size):
+            i = np.uint64(first + k)
+            x0, x1, x2 = x[i, 0], x[i, 1], x[i, 2]
+            s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = s8 = 0.0
+            l0 = l1 = l2 = 0.0
+            for h in range(np.uint64(starts[i]), np.uint64(starts[i + np.uint64(1)])):
+                j = np.uint64(neighbours[h])
+                d0, d1, d2 = x[j, 0] - x0, x[j, 1] - x1, x[j, 2] - x2
+                u0, u1, u2, w = fits[h, 0], fits[h, 1], fits[h, 2], fits[h, 3]
+                s0 += d0 * u0
+                s1 += d0 * u1
+                s2 += d0 * u2
+                s3 += d1 * u0
+                s4 += d1 * u1
+                s5 += d1 * u2
+                s6 += d2 * u0
+                s7 += d2 * u1
+                s8 += d2 * u2
+                l0 -= w * d0
+                l1 -= w * d1
+                l2 -= w * d2
+            lanes[k], lanes[LANES + k], lanes[2 * LANES + k] = s0, s1, s2
+            lanes[3 * LANES + k], lanes[4 * LANES + k], lanes[5 * LANES + k] = s3, s4, s5
+            lanes[6 * LANES + k], lanes[7 * LANES + k], lanes[8 * LANES + k] = s6, s7, s8
+            laplace_x[i, 0], laplace_x[i, 1], laplace_x[i, 2] = l0, l1, l2
+        fit_rotations(lanes, size)
+        for k in range(size):
+            for entry in range(9):
+                R[first + k, entry] = lanes[_R + entry * LANES + k]
+
+
+@parallel_kernel
+def residual(R: Floats, laplace_x: Floats, cells: Cells, out: Floats) -> None:
+    """What is left of the global step's equations at the free vertices, out (free, 3) = b(R) - L x.
+
+    Source: Sorkine and Alexa 2007, eq. (8), for the correction of x in place of x itself.
+    """
+    starts, neighbours, pulls, own = cells.starts, cells.neighbours, cells.pulls, cells.own
+    count = len(out)
+    for block in prange((count + LANES - 1) // LANES):
+        for first in range(block * LANES, min((block + 1) * LANES, count)):
+            i = np.uint64(first)
+            v0, v1, v2 = own[i, 0], own[i, 1], own[i, 2]
+            b0 = R[i, 0] * v0 + R[i, 1] * v1 + R[i, 2] * v2 - laplace_x[i, 0]
+            b1 = R[i, 3] * v0 + R[i, 4] * v1 + R[i, 5] * v2 - laplace_x[i, 1]
+            b2 = R[i, 6] * v0 + R[i, 7] * v1 + R[i, 8] * v2 - laplace_x[i, 2]
+            for h in range(np.uint64(starts[i]), np.uint64(starts[i + np.uint64(1)])):
+                j = np.uint64(neighbours[h])
+                v0, v1, v2 = pulls[h, 0], pulls[h, 1], pulls[h, 2]
+                b0 += R[j, 0] * v0 + R[j, 1] * v1 + R[j, 2] * v2
+                b1 += R[j, 3] * v0 + R[j, 4] * v1 + R[j, 5] * v2
+                b2 += R[j, 6] * v0 + R[j, 7] * v1 + R[j, 8] * v2
+            out[i, 0], out[i, 1], out[i, 2] = b0, b1, b2
+
+
+@parallel_kernel
+def energy_terms(x: Floats, R: Floats, rest: Floats, terms: Terms, out: Floats) -> None:
+    """Each term w |e' - R e|^2 of the energy, without cancellation, out (T,).
+
+    Source: Sorkine and Alexa 2007, eq. (7); Chao et al. 2010, section 4.
+    """
+    for t in prange(len(terms.cells)):
+        a, b, c = terms.tails[t], terms.heads[t], terms.cells[t]
+        e0, e1, e2 = rest[a, 0] - rest[b, 0], rest[a, 1] - rest[b, 1], rest[a, 2] - rest[b, 2]
+        d0 = x[a, 0] - x[b, 0] - (R[c, 0] * e0 + R[c, 1] * e1 + R[c, 2] * e2)
+        d1 = x[a, 1] - x[b, 1] - (R[c, 3] * e0 + R[c, 4] * e1 + R[c, 5] * e2)
+        d2 = x[a, 2] - x[b, 2] - (R[c, 6] * e0 + R[c, 7] * e1 + R[c, 8] * e2)
+        out[t] = terms.weights[t] * (d0 * d0 + d1 * d1 + d2 * d2)

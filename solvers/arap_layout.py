@@ -1,0 +1,140 @@
+"""What a deformation solver is given, checked at the door and put into the order that it works in.
+
+The order is: free vertices, so that neighbours lie near each other in memory; handles, as given;
+and carried vertices, those of components without a handle and those without a face.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import ArrayLike
+from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee
+
+from solvers.laplacian import Floats, Ints
+
+_FARTHEST = 1e9  # the farthest target, in sizes of the mesh; keeps every square finite
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """A centre (3,) and a size: inside coordinates are about one, whatever the mesh's unit is."""
+
+    centre: Floats
+    size: float
+
+    @classmethod
+    def around(cls, points: Floats) -> Frame:
+        """The frame of a point set's bounding box; a set that is one point has size one."""
+        low, high = points.min(axis=0), points.max(axis=0)
+        size = float(np.linalg.norm(high - low))
+        return cls(low + 0.5 * (high - low), size if size > 0.0 else 1.0)
+
+    def inside(self, points: Floats) -> Floats:
+        """Points (N, 3) in this frame."""
+        return (points - self.centre) / self.size
+
+    def outside(self, points: Floats) -> Floats:
+        """Points (N, 3) of this frame in the mesh's own unit."""
+        return points * self.size + self.centre
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """Vertex order[k] of the mesh is vertex k of the solver.
+
+    The first `free` are solved for, those up to `active` are the handles, the others carried.
+    `faces` (F', 3) are the solver's vertices, without the carried components' faces;
+    `parts` (N,) numbers the component of each of the solver's vertices.
+    """
+
+    order: Ints
+    free: int
+    active: int
+    faces: Ints
+    parts: Ints
+
+
+def checked_mesh(vertices: ArrayLike, faces: ArrayLike) -> tuple[Floats, Ints]:
+    """Vertices (N, 3) and faces (F, 3), or a ValueError that says what is wrong with them."""
+    points = np.asarray(vertices, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 3 or not len(points):
+        raise ValueError(f"expected vertices of shape (N, 3), N > 0, got {points.shape}")
+    if not np.isfinite(points).all():
+        bad = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
+        raise ValueError(f"vertex {bad} is not finite: {points[bad]}")
+    if np.abs(points).max() > 1e100:
+        raise ValueError("vertices beyond 1e100 are out of range")
+    triangles = _integers(faces, "faces").reshape(-1, 3) if np.size(faces) == 0 else faces
+    triangles = _integers(triangles, "faces")
+    if triangles.ndim != 2 or triangles.shape[1] != 3:
+        raise ValueError(f"expected faces of shape (F, 3), got {triangles.shape}")
+    _check_range(triangles, len(points), "faces")
+    return points, triangles
+
+
+def checked_handles(
+    handles: ArrayLike, groups: ArrayLike | None, count: int
+) -> tuple[Ints, Ints, int]:
+    """Handles (H,), the group of each (H,), 0 to G - 1, and G; or a ValueError."""
+    chosen = _integers(handles, "handles")
+    if chosen.ndim != 1 or not len(chosen):
+        raise ValueError(f"expected handles of shape (H,), H > 0, got {chosen.shape}")
+    _check_range(chosen, count, "handles")
+    unique, times = np.unique(chosen, return_counts=True)
+    if len(unique) < len(chosen):
+        raise ValueError(f"vertex {unique[times > 1][0]} is a handle more than once")
+    if groups is None:
+        return chosen, np.zeros(len(chosen), dtype=np.int64), 1
+    labels = _integers(groups, "groups")
+    if labels.shape != chosen.shape:
+        raise ValueError(f"expected groups of shape {chosen.shape}, got {labels.shape}")
+    names, group_of = np.unique(labels, return_inverse=True)
+    return chosen, group_of.astype(np.int64), len(names)
+
+
+def checked_targets(targets: ArrayLike, count: int, frame: Frame) -> Floats:
+    """Targets (H, 3), or a ValueError that says what is wrong with them."""
+    points = np.asarray(targets, dtype=np.float64)
+    if points.shape != (count, 3):
+        raise ValueError(f"expected targets of shape ({count}, 3), got {points.shape}")
+    far = np.abs(points - frame.centre).max(axis=1)
+    if not (far <= _FARTHEST * frame.size).all():
+        bad = int(np.flatnonzero(~(far <= _FARTHEST * frame.size))[0])
+        raise ValueError(f"target {bad} is not finite, or absurdly far away: {points[bad]}")
+    return points
+
+
+def lay_out(count: int, faces: Ints, handles: Ints) -> Layout:
+    """The order in which `count` vertices are worked on."""
+    tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    graph = sp.coo_matrix((np.ones(len(tails)), (tails, heads)), shape=(count, count)).tocsr()
+    graph = sp.csr_matrix(graph + graph.T)
+    parts, part_of = connected_components(graph, directed=False)
+    touched = np.zeros(parts, dtype=bool)
+    touched[part_of[handles]] = True
+    is_free = touched[part_of]
+    is_free[handles] = False
+    free = np.flatnonzero(is_free)
+    free = free[reverse_cuthill_mckee(graph[free][:, free], symmetric_mode=True)]
+    carried = np.flatnonzero(~touched[part_of])
+    order = np.concatenate([free, handles, carried])
+    place = np.empty(count, dtype=np.int64)
+    place[order] = np.arange(count)
+    kept = faces[touched[part_of[faces[:, 0]]]]
+    return Layout(order, len(free), len(free) + len(handles), place[kept], part_of[order])
+
+
+def _integers(values: ArrayLike, name: str) -> Ints:
+    array = np.asarray(values)
+    if array.size and not np.issubdtype(array.dtype, np.integer):
+        raise ValueError(f"expected integer {name}, got {array.dtype}")
+    return array.astype(np.int64)
+
+
+def _check_range(indices: Ints, count: int, name: str) -> None:
+    if indices.size and (indices.min() < 0 or indices.max() >= count):
+        bad = indices[(indices < 0) | (indices >= count)].ravel()[0]
+        raise ValueError(f"{name} name vertex {bad}, but there are {count} vertices")
