@@ -1,0 +1,320 @@
+"""Ranks the parts of a character that a performer's pose resembles on the screen.
+
+Source: AniMesh (Jin et al. 2015), section 4.2 and figure 3g.
+
+Both trees are moved so that their roots coincide, scaled so that the longest branch has length one
+and projected to the screen. A match's score is the paper's: the sum, over the pairs of branches, of
+the cosine of the angle between them. A branch that (after the scaling) is nearly perpendicular to
+the screen has no angle there; its cosine fades to 0 as its picture gets shorter than `_FADE`.
+
+A performer with several branching places (a body: shoulders and hips) also meets the unfolded
+sub-trees of `abstraction`, and then what lies between the places is paired as well: pelvis to chest
+with the same stretch on the character. Those inner pairs carry no score.
+
+More pairs can make a larger sum, so where a part of the character can take all of the performer's
+branches, it wins over one that can take fewer. With `size_preference` = 0 the order is that of the
+scores; above 0 each pair is worth that much more times the length of its target chain against the
+character's longest, so that limbs win over spurs that happen to point the same way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Container, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from solvers.abstraction import SimplifiedSource, SubTree, abstract, simplify
+from solvers.assignment import MOST_COLUMNS, rank_assignments
+from solvers.tree import Tree, extend_to_leaf
+
+__all__ = ["Match", "TargetHierarchy", "Tree", "extend_to_leaf", "rank_matches"]
+
+Array = NDArray[np.float64]
+Chain = tuple[int, ...]
+
+SIZE_PREFERENCE: Final = 0.25  # what suits a live show: a quarter of a perfect pair for full size
+_FADE: Final = 0.05  # of the longest branch
+_REMEMBERED: Final = 4096  # matches whose chains are kept ready
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    """One way to let a performer drive a part of a character.
+
+    Attributes:
+        score: sum of the cosines over the first `limbs` pairs, at most `limbs`.
+        pairs: chains of source and of target nodes, from the root outward; first the limbs (target
+            chains extended to a leaf, figure 5 right), then the inner chains between their roots.
+        limbs: how many pairs are limbs.
+        stops: for each pair how many nodes of its target chain lead up to the abstracted sub-tree's
+            root (figure 5 middle).
+        root: target node that stays in place; all target chains lead away from it.
+        level: level of detail of the sub-tree, from 1 (small parts) up.
+        merit: what the list is ordered by: the score and, if asked for, the preference for size.
+    """
+
+    score: float
+    pairs: tuple[tuple[Chain, Chain], ...]
+    limbs: int
+    stops: tuple[int, ...]
+    root: int
+    level: int
+    merit: float
+
+    def stopped(self) -> Match:
+        """The same match with its target chains stopping at the sub-trees' roots."""
+        stopped = tuple(
+            (source, target[:stop])
+            for (source, target), stop in zip(self.pairs, self.stops, strict=True)
+        )
+        return replace(self, pairs=stopped)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Candidates:
+    """The sub-trees that sources of one kind are compared with, their branches side by side."""
+
+    subtrees: tuple[SubTree, ...]
+    starts: NDArray[np.int64]  # (C + 1,)
+    vectors: Array  # (T, 3) from the sub-tree's centre, its longest branch of length one
+    sizes: Array  # (T,) length of the extended chain against the longest of all
+
+
+class TargetHierarchy:
+    """A character's skeleton, taken apart once, to be matched in every frame.
+
+    Args:
+        tree: the character's skeleton at rest.
+        root: node to take as the hierarchy's root; found if not given.
+    """
+
+    def __init__(self, tree: Tree, root: int | None = None) -> None:
+        self.tree = tree
+        self.hierarchy = abstract(tree, root)
+        self._candidates: dict[tuple[int, bool], _Candidates] = {}
+        self._built: dict[tuple[int, Chain, int], Match] = {}
+        self._source: SimplifiedSource | None = None
+
+    def rank(
+        self,
+        source: SimplifiedSource,
+        view: ArrayLike,
+        positions: ArrayLike | None = None,
+        *,
+        limit: int = 20,
+        source_view: ArrayLike | None = None,
+        size_preference: float = 0.0,
+    ) -> list[Match]:
+        """Matches with a performer's pose, best first.
+
+        Args:
+            source: the performer's skeleton, simplified once.
+            view: (3, 3) rotation from the stage to the camera (x right, y up, z to the viewer).
+            positions: (J, 3) the joints now, finite; the skeleton's rest if not given.
+            limit: how many at most.
+            source_view: (3, 3) as `view`, for the capture device; seen straight on if not given.
+            size_preference: see the module.
+
+        Source: AniMesh, section 4.2.
+        """
+        pose = source.tree.positions if positions is None else np.asarray(positions, np.float64)
+        if len(source.chains) == 0 or limit < 1:
+            return []
+        candidates = self._for(len(source.chains), len(source.forks) > 1)
+        if not candidates.subtrees:
+            return []
+        seen = _on_screen(source.branch_vectors(pose) / max(source.length, 1e-300), source_view)
+        cosines = seen @ _on_screen(candidates.vectors, view).T
+        values = cosines + size_preference * candidates.sizes
+        # Two unfoldings can hold the same match: ask for more, and keep the first of each.
+        taken, columns, merits = rank_assignments(values, candidates.starts, 2 * limit)
+        if source is not self._source:
+            self._built.clear()
+            self._source = source
+        matches: dict[tuple[int, tuple[tuple[Chain, Chain], ...]], Match] = {}
+        for which, row, merit in zip(taken.tolist(), columns, merits.tolist(), strict=True):
+            match = self._match(source, candidates.subtrees[which], tuple(row.tolist()))
+            paired = np.flatnonzero(row >= 0)
+            score = float(cosines[paired, candidates.starts[which] + row[paired]].sum())
+            key = match.root, match.pairs
+            if key not in matches:
+                matches[key] = replace(match, score=score, merit=merit)
+        return list(matches.values())[:limit]
+
+    def _for(self, branches: int, several_forks: bool) -> _Candidates:
+        key = branches, several_forks
+        if key not in self._candidates:
+            self._candidates[key] = _gather(self.tree, self.hierarchy.subtrees, *key)
+        return self._candidates[key]
+
+    def _match(self, source: SimplifiedSource, subtree: SubTree, columns: Chain) -> Match:
+        """The match without its score; its chains are worked out once."""
+        key = id(subtree), columns, len(source.chains)
+        if key not in self._built:
+            if len(self._built) >= _REMEMBERED:
+                self._built.clear()
+            self._built[key] = _build(self.tree, source, subtree, columns)
+        return self._built[key]
+
+
+def rank_matches(
+    source: Tree,
+    target: Tree,
+    view: ArrayLike,
+    *,
+    limit: int = 100,
+    source_view: ArrayLike | None = None,
+    size_preference: float = 0.0,
+) -> list[Match]:
+    """Rank the parts of `target` that the pose of `source` resembles on the screen, best first.
+
+    Args:
+        source: the performer's joints as they are posed, seen straight on (x right, y up).
+        target: the character's skeleton.
+        view: (3, 3) rotation from the stage to the target's camera (x right, y up, z to viewer).
+        limit: how many matches at most.
+        source_view: (3, 3) as `view`, for the source.
+        size_preference: worth of a full-sized limb over a spur; 0 orders by the score alone.
+
+    Source: AniMesh (Jin et al. 2015), section 4.
+    """
+    return TargetHierarchy(target).rank(
+        simplify(source),
+        view,
+        limit=limit,
+        source_view=source_view,
+        size_preference=size_preference,
+    )
+
+
+def _on_screen(vectors: Array, view: ArrayLike | None) -> Array:
+    """Directions (n, 2) of vectors on the screen: unit, or shorter where the picture is a dot."""
+    if view is not None:
+        rotation = np.asarray(view, dtype=np.float64)
+        if rotation.shape != (3, 3):
+            raise ValueError(f"Expected a view of shape (3, 3), got {rotation.shape}")
+        vectors = vectors @ rotation.T
+    flat = vectors[:, :2]
+    lengths = np.sqrt((flat * flat).sum(axis=1, keepdims=True))
+    directions: Array = flat / np.maximum(lengths, _FADE)
+    return directions
+
+
+def _gather(
+    tree: Tree, subtrees: Sequence[SubTree], branches: int, several_forks: bool
+) -> _Candidates:
+    """The candidates for sources with so many branches.
+
+    A sub-tree as the paper folds it always is one; unfolded, where it has too few branches
+    otherwise, or as far as the body plan where the source has several branching places.
+    """
+    chosen = [
+        _largest(subtree)
+        for subtree in subtrees
+        if subtree.branches
+        and (
+            subtree.unfolding == 0
+            or subtree.coarser < branches
+            or (several_forks and subtree.body_plan)
+        )
+    ]
+    chosen.sort(key=lambda s: (-sum(b.length for b in s.branches), s.unfolding, s.root))
+    flat = [branch for subtree in chosen for branch in subtree.branches]
+    lengths = np.array([tree.length(branch.chain + branch.extension) for branch in flat])
+    vectors = np.zeros((len(flat), 3))
+    starts = np.cumsum([0] + [len(subtree.branches) for subtree in chosen])
+    for subtree, first, end in zip(chosen, starts, starts[1:], strict=False):
+        block = np.array([branch.position for branch in subtree.branches])
+        block -= tree.positions[subtree.centre]
+        vectors[first:end] = block / max(np.linalg.norm(block, axis=1).max(), 1e-300)
+    sizes = lengths / max(lengths.max(initial=0.0), 1e-300)
+    return _Candidates(tuple(chosen), starts, vectors, sizes)
+
+
+def _largest(subtree: SubTree) -> SubTree:
+    """At most `MOST_COLUMNS` branches, the longest, in their order."""
+    if len(subtree.branches) <= MOST_COLUMNS:
+        return subtree
+    kept = sorted(subtree.branches, key=lambda branch: -branch.length)[:MOST_COLUMNS]
+    return replace(subtree, branches=tuple(b for b in subtree.branches if b in kept))
+
+
+def _build(tree: Tree, source: SimplifiedSource, subtree: SubTree, columns: Chain) -> Match:
+    """The chains that a choice of branches drives; `columns` gives each source branch's branch."""
+    limbs = [
+        (chain, subtree.branches[column])
+        for chain, column in zip(source.chains, columns, strict=True)
+        if column >= 0
+    ]
+    pairs = [(chain, branch.chain + branch.extension) for chain, branch in limbs]
+    stops = [len(branch.chain) for _, branch in limbs]
+    places = _place_forks(tree, source, subtree.root, pairs)
+    inner = _inner_pairs(tree, source, places)
+    root = next(iter(places.values()))
+    if source.stem and subtree.stem and root == subtree.root and source.stem[-1] in places:
+        inner.append((source.stem, subtree.stem))
+        root = subtree.stem[0]
+    stops += [len(target) for _, target in inner]
+    return Match(0.0, (*pairs, *inner), len(pairs), tuple(stops), root, subtree.level, 0.0)
+
+
+def _place_forks(
+    tree: Tree, source: SimplifiedSource, root: int, limbs: Sequence[tuple[Chain, Chain]]
+) -> dict[int, int]:
+    """For each source fork the target node where its limbs meet, seen from the sub-tree's root.
+
+    A fork that carries no matched limb lies where those that hang on it meet. The source fork
+    nearest to the performer's root comes first.
+    """
+    places: dict[int, int] = {}
+    hanging: dict[int, list[int]] = {fork: [] for fork in source.forks}
+    for fork in reversed(source.forks):  # those further out first
+        own = [target[0] for chain, target in limbs if chain[0] == fork]
+        below = hanging[fork]
+        if own or len(below) > 1:
+            places[fork] = _meet(tree, root, own or below)
+            below = [places[fork]]
+        above = _next_above(source, fork, hanging)
+        if above is not None:
+            hanging[above].extend(below)
+    return dict(reversed(places.items()))
+
+
+def _inner_pairs(
+    tree: Tree, source: SimplifiedSource, places: dict[int, int]
+) -> list[tuple[Chain, Chain]]:
+    """The stretches between forks that both sides have, those nearer to the root first."""
+    root = next(iter(places.values()))
+    driven: set[tuple[int, int]] = set()
+    pairs: list[tuple[Chain, Chain]] = []
+    for fork, node in places.items():
+        above = _next_above(source, fork, places)
+        if above is None or places[above] == node:
+            continue
+        target = tree.chain(places[above], node)
+        outward = tree.chain(root, node)[-len(target) :] == target
+        if outward and driven.isdisjoint(pairwise(target)):
+            driven.update(pairwise(target))
+            pairs.append((source.tree.chain(above, fork), target))
+    return pairs
+
+
+def _next_above(source: SimplifiedSource, fork: int, among: Container[int]) -> int | None:
+    """The next of the forks in `among` on the way from `fork` to the performer's root."""
+    node = int(source.tree.parents[fork])
+    while node >= 0 and node not in among:
+        node = int(source.tree.parents[node])
+    return node if node >= 0 else None
+
+
+def _meet(tree: Tree, root: int, nodes: Sequence[int]) -> int:
+    """The node where the ways from `root` to all of `nodes` part."""
+    ways = [tree.chain(root, node) for node in nodes]
+    shared = 0
+    while all(len(way) > shared and way[shared] == ways[0][shared] for way in ways):
+        shared += 1
+    return ways[0][shared - 1]

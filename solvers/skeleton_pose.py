@@ -1,0 +1,126 @@
+"""Forward kinematics of a character's skeleton whose chains are driven by bone rotations.
+
+Source: AniMesh (Jin et al. 2015), section 5.2 and figure 5: what hangs on a driven chain rides
+rigidly with it.
+
+Rotations are world rotations from rest, so a limb that hangs on a driven spine starts from where
+the spine has moved to, but points where the performer's limb points: the source was measured in the
+world as well, and nothing is turned twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.compiled import kernel
+from solvers.quaternion import halfway, normalized, rotate
+from solvers.tree import Tree
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class SkeletonPose:
+    """Moves the nodes of a tree with its driven chains; assembled once, posed every frame.
+
+    Args:
+        tree: K nodes at rest.
+        root: the node that stays where it is; every chain leads away from it.
+        chains: node ids of the driven chains. They share no bone; where one ends another may start.
+
+    Raises:
+        ValueError: a chain that does not follow bones away from the root, or a bone driven twice.
+    """
+
+    def __init__(self, tree: Tree, root: int, chains: Sequence[Sequence[int]]) -> None:
+        oriented = tree.rerooted(root)
+        self._rest = oriented.positions
+        self._order = np.array(oriented.order, dtype=np.int64)
+        self._parents = oriented.parents
+        self._driver = np.full(len(tree), -1, dtype=np.int64)  # row of the bone that ends here
+        self._next = np.full(len(tree), -1, dtype=np.int64)  # row of the same chain's next bone
+        row = 0
+        for chain in chains:
+            for step, (above, node) in enumerate(pairwise(chain)):
+                if oriented.parents[node] != above:
+                    raise ValueError(f"Expected a chain away from node {root}, got {tuple(chain)}")
+                if self._driver[node] >= 0:
+                    raise ValueError(f"Expected each bone to be driven once, got {above}-{node}")
+                self._driver[node] = row
+                self._next[node] = row + 1 if step + 2 < len(chain) else -1
+                row += 1
+        self._bones = row
+
+    def pose(self, bone_rotations: Sequence[Array]) -> tuple[Array, Array]:
+        """Rotations (K, 4) and positions (K, 3) of all nodes.
+
+        A point x of the surface that follows node k goes to R_k (x - rest_k) + position_k. Inside a
+        chain a node takes the rotation halfway between its two bones, at the chain's end that of
+        its last bone; where a chain starts the node keeps what moves it otherwise, so that the
+        joint region bends from the one to the other. All other nodes ride with their parent.
+
+        Args:
+            bone_rotations: for each chain, world rotations from rest (len(chain) - 1, 4).
+
+        Raises:
+            ValueError: not one rotation for each driven bone.
+        """
+        stacked = np.concatenate([np.zeros((0, 4)), *bone_rotations])
+        if stacked.shape != (self._bones, 4):
+            raise ValueError(
+                f"Expected {self._bones} rotations of driven bones, got shape {stacked.shape}"
+            )
+        rotations = np.empty((len(self._rest), 4))
+        positions = np.empty((len(self._rest), 3))
+        links = np.column_stack([self._order, self._parents[self._order]])
+        _forward(links, self._rest, self._driver, self._next, stacked, rotations, positions)
+        return rotations, positions
+
+
+def pose(
+    tree: Tree, root: int, chains: Sequence[Sequence[int]], bone_rotations: Sequence[Array]
+) -> tuple[Array, Array]:
+    """Rotations (K, 4) and positions (K, 3) of all nodes; see `SkeletonPose`."""
+    return SkeletonPose(tree, root, chains).pose(bone_rotations)
+
+
+@kernel
+def _forward(  # noqa: PLR0917
+    links: Ints,
+    rest: Array,
+    driver: Ints,
+    following: Ints,
+    bones: Array,
+    rotations: Array,
+    positions: Array,
+) -> None:
+    """Place every node after its parent."""
+    for step in range(len(links)):
+        node, parent = links[step, 0], links[step, 1]
+        if parent < 0:
+            rotations[node] = np.array([0.0, 0.0, 0.0, 1.0])
+            positions[node] = rest[node]
+            continue
+        above = rotations[parent]
+        bone = (above[0], above[1], above[2], above[3])
+        if driver[node] >= 0:
+            own = bones[driver[node]]
+            bone = normalized((own[0], own[1], own[2], own[3]))
+        offset = rotate(
+            bone,
+            (
+                rest[node, 0] - rest[parent, 0],
+                rest[node, 1] - rest[parent, 1],
+                rest[node, 2] - rest[parent, 2],
+            ),
+        )
+        for k in range(3):
+            positions[node, k] = positions[parent, k] + offset[k]
+        if following[node] >= 0:
+            own = bones[following[node]]
+            bone = halfway(bone, normalized((own[0], own[1], own[2], own[3])))
+        rotations[node, 0], rotations[node, 1], rotations[node, 2], rotations[node, 3] = bone
