@@ -1,0 +1,285 @@
+"""The grammar of BVH: the hierarchy of joints and the table of channel values, as written.
+
+The format has no standard; what is accepted here are the variants seen in the wild: any white space
+and case, a byte order mark, several roots, joints without end sites, names with blanks, colons and
+dots, frames cut over lines, a wrong frame count, a cut last frame, decimal commas.
+Source: Meredith and Maddock 2001, "Motion Capture File Formats Explained", section 2.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+from numpy.typing import NDArray
+
+from devices.errors import InputError
+
+MOST_BYTES = 512 * 2**20
+MOST_JOINTS = 10_000
+MOST_POSES = 20_000_000  # frames times joints
+_LARGEST = 1e7  # a length or an angle beyond this is no measurement
+_USUAL_FRAME_TIME = 1 / 30
+_CHANNEL = re.compile(r"([XYZ])(position|rotation|scale)$", re.IGNORECASE)
+_MOTION = re.compile(r"\}\s*MOTION\b", re.IGNORECASE)
+_TIMING = re.compile(
+    r"\s*Frames\s*:?[ \t]*([^\s:]*)\s+Frame\s*Time\s*:?[ \t]*([^\s:]*)", re.IGNORECASE
+)
+_NOT_A_NUMBER = re.compile(r"[-+]?(?:1\.#\w+|nan\(\w*\))", re.IGNORECASE)  # C runtime of Windows
+
+
+@dataclass(slots=True)
+class BvhJoint:
+    """A joint or end site as declared.
+
+    Attributes:
+        name: as written; "" for an end site.
+        parent: index of the joint that encloses it, -1 for a root.
+        offset: from the parent at rest, in the file's unit.
+        channels: (axis 0 to 2, "position", "rotation" or "scale"), in the order of the columns.
+    """
+
+    name: str
+    parent: int
+    offset: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    channels: list[tuple[int, str]] = field(default_factory=list)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BvhText:
+    """What a BVH file says, nothing interpreted.
+
+    Attributes:
+        joints: in the order of the file, parents first; end sites among them.
+        motion: (T, C) values of all channels; NaN where the file has no usable number.
+        frame_time: [s] between frames, positive.
+        notes: what was mended.
+    """
+
+    joints: list[BvhJoint]
+    motion: NDArray[np.float64]
+    frame_time: float
+    notes: list[str]
+
+
+def read_bvh_text(path: Path) -> BvhText:
+    """Parse the file at `path`.
+
+    Raises:
+        InputError: unreadable, too large, or not BVH; with the line where that shows.
+    """
+    text = _decoded(path)
+    motion = _MOTION.search(text)
+    if not re.match(r"\s*HIERARCHY\b", text, re.IGNORECASE):
+        raise InputError(f"{path}: not a BVH file, it does not begin with HIERARCHY")
+    if motion is None:
+        raise InputError(f"{path}: no MOTION section after the hierarchy; the file may be cut")
+    joints = _Hierarchy(path, text[: motion.start() + 1]).parse()
+    timing = _TIMING.match(text, motion.end())
+    line = 1 + text.count("\n", 0, motion.end())
+    if timing is None:
+        raise InputError(
+            f"{path}, line {line}: after MOTION there should be 'Frames:' and 'Frame Time:'"
+        )
+    notes: list[str] = []
+    columns = sum(len(joint.channels) for joint in joints)
+    block = text[timing.end() :]
+    first_line = 1 + text.count("\n", 0, timing.end())
+    values = _table(path, block, columns, first_line, notes)
+    if len(values) * len(joints) > MOST_POSES:
+        raise InputError(
+            f"{path}: {len(values)} frames of {len(joints)} joints are too many; split the file"
+        )
+    if timing[1] != str(len(values)):
+        notes.append(f"declares {timing[1] or 'no number of'} frames, holds {len(values)}")
+    return BvhText(joints, values, _frame_time(timing[2], notes), notes)
+
+
+def _decoded(path: Path) -> str:
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise InputError(f"{path}: larger than {MOST_BYTES // 2**20} MiB; split the recording")
+        raw = path.read_bytes()
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {error.strerror or error}") from error
+    for mark, encoding in (
+        (b"\xef\xbb\xbf", "utf-8"),
+        (b"\xff\xfe", "utf-16"),
+        (b"\xfe\xff", "utf-16"),
+    ):
+        if raw.startswith(mark):
+            return raw.decode(encoding, errors="replace").removeprefix("\ufeff").replace("\r", "\n")
+    try:
+        text = raw.decode("utf-8")
+    except UnicodeDecodeError:
+        text = raw.decode("latin-1")
+    return text if "\n" in text else text.replace("\r", "\n")
+
+
+class _Hierarchy:
+    """Reads the text before MOTION, word by word, remembering where it is for error messages."""
+
+    def __init__(self, path: Path, text: str) -> None:
+        self._path = path
+        self._text = text
+        self._at = 0
+        self._joints: list[BvhJoint] = []
+        self._open: list[int] = []  # joints whose braces are open
+
+    def parse(self) -> list[BvhJoint]:
+        self._word()  # HIERARCHY, as was checked
+        while word := self._word():
+            match word.upper():
+                case "ROOT" | "JOINT":
+                    self._declare(self._name() or word.lower())
+                case "END":
+                    self._name()
+                    self._declare("")
+                case "OFFSET":
+                    x, y, z = self._number(), self._number(), self._number()
+                    self._current().offset = (x, y, z)
+                case "CHANNELS":
+                    self._channels(self._current())
+                case "}":
+                    self._current()
+                    self._open.pop()
+                case _:
+                    self._fail(
+                        f"expected JOINT, OFFSET, CHANNELS, End Site or a brace, got {word!r}"
+                    )
+        if self._open:
+            self._fail(f"{len(self._open)} braces of the hierarchy are not closed")
+        if not self._joints:
+            self._fail("the hierarchy has no ROOT")
+        return self._joints
+
+    def _declare(self, name: str) -> None:
+        if self._word() != "{":
+            self._fail(f"expected an opening brace after {name or 'End Site'!r}")
+        if len(self._joints) >= MOST_JOINTS:
+            self._fail(f"more than {MOST_JOINTS} joints")
+        self._joints.append(BvhJoint(name, self._open[-1] if self._open else -1))
+        self._open.append(len(self._joints) - 1)
+
+    def _current(self) -> BvhJoint:
+        if not self._open:
+            self._fail("outside of any joint's braces")
+        return self._joints[self._open[-1]]
+
+    def _channels(self, joint: BvhJoint) -> None:
+        count = self._word()
+        if not count.isdecimal() or int(count) > 99:
+            self._fail(f"expected the number of channels, got {count!r}")
+        for _ in range(int(count)):
+            word = self._word()
+            channel = _CHANNEL.match(word)
+            if channel is None:
+                self._fail(f"expected one of {count} channels such as Xrotation, got {word!r}")
+            joint.channels.append(("xyz".index(channel[1].lower()), channel[2].lower()))
+
+    def _word(self) -> str:
+        word = re.compile(r"\s*([{}]|[^\s{}]+)").match(self._text, self._at)
+        if word is None:
+            return ""
+        self._at = word.end()
+        return word[1]
+
+    def _name(self) -> str:
+        """The rest of the line, or up to a brace: names may hold blanks."""
+        name = re.compile(r"[^\n{}]*").match(self._text, self._at)
+        assert name is not None
+        self._at = name.end()
+        return " ".join(name[0].split())
+
+    def _number(self) -> float:
+        word = self._word()
+        try:
+            number = float(word.replace(",", "."))
+        except ValueError:
+            self._fail(f"expected a number, got {word!r}")
+        if not abs(number) < _LARGEST:
+            self._fail(f"{word} is no sensible length")
+        return number
+
+    def _fail(self, what: str) -> NoReturn:
+        line = 1 + self._text.count("\n", 0, self._at)
+        raise InputError(f"{self._path}, line {line}: {what}")
+
+
+def _table(
+    path: Path, block: str, columns: int, first_line: int, notes: list[str]
+) -> NDArray[np.float64]:
+    """The channel values (T, columns) of `block`, whose first line is `first_line` of the file."""
+    if columns == 0:
+        notes.append("no joint has a channel: one frame of the rest pose")
+        return np.zeros((1, 0))
+    if "," in block:
+        block = block.replace(",", " " if "." in block else ".")
+        notes.append("commas among the numbers")
+    lines = block.split("\n")
+    counts = [len(line.split()) for line in lines]
+    if _NOT_A_NUMBER.search(block):
+        lines = [_NOT_A_NUMBER.sub("nan", line) for line in lines]
+    end, frames = _whole_frames(path, counts, columns, first_line)
+    if sum(counts[end:]):
+        notes.append("the last frame is cut and was left out")
+    if _numbers(lines[end - 1]) is None and frames:
+        end, frames = end - 1, frames - 1
+        end -= next((n for n in range(end) if sum(counts[end - n : end]) % columns == 0), 0)
+        notes.append("the last frame is cut and was left out")
+    values = _numbers("\n".join(lines[:end]))
+    if values is None or values.size != sum(counts[:end]):
+        bad = next(
+            n for n in range(end) if (v := _numbers(lines[n])) is None or v.size != counts[n]
+        )
+        raise InputError(f"{path}, line {first_line + bad}: something that is no number")
+    if frames == 0:
+        raise InputError(f"{path}: no whole frame after 'Frame Time:'")
+    unusable = ~(np.abs(values) < _LARGEST)
+    if unusable.any():
+        notes.append(f"{np.count_nonzero(unusable)} values are no finite, sensible numbers")
+        values[unusable] = np.nan
+    return values.reshape(frames, columns)
+
+
+def _whole_frames(path: Path, counts: list[int], columns: int, first_line: int) -> tuple[int, int]:
+    """How many lines hold how many whole frames; a frame may go over lines but ends with one."""
+    held, end, frames = 0, 0, 0
+    for line, count in enumerate(counts):
+        held += count
+        if held > columns:
+            raise InputError(
+                f"{path}, line {first_line + line}: a frame should have {columns} values as the "
+                f"hierarchy declares, got {held}"
+            )
+        if held == columns:
+            held, end, frames = 0, line + 1, frames + 1
+    return end, frames
+
+
+def _numbers(text: str) -> NDArray[np.float64] | None:
+    """All numbers of `text`, or None where something else stands between them."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            return np.fromstring(text, dtype=np.float64, sep=" ") if text.strip() else np.zeros(0)
+        except (DeprecationWarning, ValueError):
+            return None
+
+
+def _frame_time(word: str, notes: list[str]) -> float:
+    try:
+        seconds = float(word.replace(",", "."))
+    except ValueError:
+        seconds = float("nan")
+    if 10.0 <= seconds <= 1000.0:
+        notes.append(f"frame time {word} was taken as frames per second")
+        return 1 / seconds
+    if not 1e-5 <= seconds < 10.0:
+        notes.append(f"frame time {word!r} is unusable, taken as 1/30 s")
+        return _USUAL_FRAME_TIME
+    return seconds

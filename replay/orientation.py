@@ -1,0 +1,185 @@
+"""Turn, scale and place a recording: metres, +Y up, the performer facing +Z, feet on the floor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from devices.anatomy import Kind, Part, Side, first_of, heading_joints
+from devices.skeleton import Skeleton
+
+Array = NDArray[np.float64]
+
+_SIDES = (Side.LEFT, Side.RIGHT)
+_MOST_SAMPLES = 200  # frames that a statistic of the whole recording looks at
+_REST_WEIGHT = 0.2  # of the rest pose beside the motion, for whoever lies down all the time
+_SPINE_WEIGHT = 0.5  # of the spine beside the legs: an elephant's lies level
+_LEAST_TURN = 0.2  # of the joints' distance that must be left, seen from above, to tell a heading
+_LEG_AND_SPINE = 0.87  # of a body's height: hip to ankle and pelvis to head, along the bones
+
+
+def up_axis(
+    skeleton: Skeleton, parts: Sequence[Part | None], positions: Array, rest: Array
+) -> Array | None:
+    """The axis (3,) of the recording's own frame along which the body stands, a unit vector.
+
+    Legs tell first, from foot to hip; the spine counts half; the rest pose a fifth.
+
+    Args:
+        skeleton: of `positions`; only its tree is used.
+        parts: its labels.
+        positions: (T, J, 3), any unit and frame; NaN where not seen.
+        rest: (J, 3), in the same frame.
+
+    Returns:
+        The axis, or None where the skeleton has neither legs nor a head over hips.
+    """
+    frames = _sampled(positions)
+    rising = _rising(skeleton, parts, frames)
+    if rising is None:
+        return None
+    length = np.linalg.norm(rising, axis=1, keepdims=True)
+    seen = np.isfinite(length[:, 0]) & (length[:, 0] > 0)
+    mean = (rising[seen] / length[seen]).mean(axis=0) if seen.any() else np.zeros(3)
+    at_rest = _rising(skeleton, parts, rest[None])
+    if at_rest is not None and np.linalg.norm(at_rest[0]) > 0:
+        mean = mean + _REST_WEIGHT * at_rest[0] / np.linalg.norm(at_rest[0])
+    axis = np.zeros(3)
+    axis[np.argmax(np.abs(mean))] = np.sign(mean[np.argmax(np.abs(mean))]) or 1.0
+    return axis
+
+
+def stands_upright(
+    skeleton: Skeleton, parts: Sequence[Part | None], positions: Array, up: Array
+) -> bool:
+    """Whether the head is above the hips, within 60 degrees, in most frames: a biped's body."""
+    spine = _between(
+        _place(skeleton, parts, Kind.HIPS), _head(skeleton, parts), _sampled(positions)
+    )
+    if spine is None:
+        return False
+    rise = (spine @ up) / np.maximum(np.linalg.norm(spine, axis=1), 1e-12)
+    rise = rise[np.isfinite(rise)]
+    return bool(rise.size and np.median(rise) > 0.5)
+
+
+def legs_hang(skeleton: Skeleton, parts: Sequence[Part | None], pose: Array, up: Array) -> bool:
+    """Whether the legs of a pose (J, 3) that has any hang within 60 degrees."""
+    for side in _SIDES:
+        hip, foot = (_place(skeleton, parts, kind, side) for kind in (Kind.UPPER_LEG, Kind.FOOT))
+        leg = _between(foot, hip, pose[None])
+        if leg is not None and not leg[0] @ up > 0.5 * np.linalg.norm(leg[0]):
+            return False
+    return True
+
+
+def body_height(skeleton: Skeleton, parts: Sequence[Part | None], rest: Array) -> float | None:
+    """How tall a person with these bones is, from the lengths of leg and spine; pose-free.
+
+    Returns:
+        The height in the unit of `rest`, or None where a leg, the hips or the head is missing.
+    """
+    head = _head(skeleton, parts)
+    hips = _place(skeleton, parts, Kind.HIPS)
+    legs = []
+    for side in _SIDES:
+        ends = [_place(skeleton, parts, kind, side) for kind in (Kind.UPPER_LEG, Kind.FOOT)]
+        if ends[0] is not None and ends[1] is not None:
+            legs.append(_along(skeleton, rest, ends[0], ends[1]))
+    if head is None or hips is None or not legs:
+        return None
+    return (float(np.mean(legs)) + _along(skeleton, rest, hips, head)) / _LEG_AND_SPINE
+
+
+def up_to_y(up: Array) -> Array:
+    """The rotation (3, 3) that carries the axis `up`, one of the six, to +Y by a quarter turn."""
+    y = np.array([0.0, 1.0, 0.0])
+    if up[1] != 0:
+        return np.diag([1.0, up[1], up[1]])  # half a turn about X when the body hangs from -Y
+    turn = np.cross(up, y)
+    return np.outer(turn, turn) + np.outer(y, up) - np.outer(up, y)
+
+
+def yaw_to_front(skeleton: Skeleton, positions: Array) -> Array | None:
+    """The rotation (3, 3) about +Y after which the performer faces +Z in the first frame.
+
+    Hips and shoulders tell: left must come to lie on +X. The first frame in which they are seen and
+    not one above the other decides.
+
+    Args:
+        skeleton: of `positions`.
+        positions: (T, J, 3), +Y up.
+    """
+    pairs = heading_joints(skeleton)
+    if not pairs:
+        return None
+    for frame in positions:
+        across = np.array([frame[left] - frame[right] for left, right in pairs])
+        across = across[np.isfinite(across).all(axis=1)]
+        if not len(across):
+            continue
+        x, _, z = across.sum(axis=0)
+        flat = float(np.hypot(x, z))
+        if flat > _LEAST_TURN * float(np.linalg.norm(across, axis=1).sum()):
+            return np.array(
+                [[x / flat, 0.0, z / flat], [0.0, 1.0, 0.0], [-z / flat, 0.0, x / flat]]
+            )
+    return None
+
+
+def floor_and_start(positions: Array, hips: int) -> Array:
+    """What to subtract (3,): the lowest joint comes to y = 0, the hips' start to x = z = 0."""
+    seen = positions[np.isfinite(positions[:, hips]).all(axis=1), hips]
+    low = positions[..., 1]
+    low = low[np.isfinite(low)]
+    x, z = (seen[0, 0], seen[0, 2]) if len(seen) else (0.0, 0.0)
+    return np.array([x, low.min() if low.size else 0.0, z])
+
+
+def _sampled(positions: Array) -> Array:
+    return positions[:: max(1, len(positions) // _MOST_SAMPLES)]
+
+
+def _place(
+    skeleton: Skeleton, parts: Sequence[Part | None], kind: Kind, side: Side = Side.CENTRE
+) -> int | None:
+    return first_of(parts, skeleton, kind, side)
+
+
+def _head(skeleton: Skeleton, parts: Sequence[Part | None]) -> int | None:
+    head = _place(skeleton, parts, Kind.HEAD)
+    return _place(skeleton, parts, Kind.NECK) if head is None else head
+
+
+def _between(start: int | None, end: int | None, frames: Array) -> Array | None:
+    return None if start is None or end is None else frames[:, end] - frames[:, start]
+
+
+def _rising(skeleton: Skeleton, parts: Sequence[Part | None], frames: Array) -> Array | None:
+    """In each frame (T, 3) the sum of what points up along a standing body."""
+    vectors = []
+    for side in _SIDES:
+        foot = _place(skeleton, parts, Kind.FOOT, side)
+        if foot is None:
+            foot = _place(skeleton, parts, Kind.LOWER_LEG, side)
+        leg = _between(foot, _place(skeleton, parts, Kind.UPPER_LEG, side), frames)
+        if leg is not None:
+            vectors.append(leg)
+    spine = _between(_place(skeleton, parts, Kind.HIPS), _head(skeleton, parts), frames)
+    if spine is not None:
+        vectors.append(_SPINE_WEIGHT * spine)
+    return None if not vectors else np.sum(vectors, axis=0)
+
+
+def _along(skeleton: Skeleton, rest: Array, start: int, end: int) -> float:
+    """Length along the bones from `end` up to `start`, or straight where that is no ancestor."""
+    length, joint = 0.0, end
+    while joint != start:
+        parent = int(skeleton.parents[joint])
+        if parent < 0:
+            return float(np.linalg.norm(rest[end] - rest[start]))
+        length += float(np.linalg.norm(rest[joint] - rest[parent]))
+        joint = parent
+    return length
