@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PerformedFrame:
-    """One tick of one character's performance, everything solved.
+    """One tick of one character's performance, everything solved; nobody changes its arrays.
 
     Attributes:
         index: counts the frames of the show from 0.
