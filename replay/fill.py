@@ -80,10 +80,9 @@ class Filler:
         seen = np.logical_and.reduce(near, axis=1)
         memory = self._memory(frame)
         self._measure(memory, frame.positions, seen)
-        offsets = self._offsets(memory, frame.time)
         positions = np.where(seen[:, None], frame.positions, 0.0)
         if not seen.all():
-            self._place(positions, seen, offsets, memory)
+            self._place(positions, seen, self._offsets(memory, frame.time), memory)
         self._remember(memory, positions, seen, frame.time)
         return FilledFrame(positions, ~seen)
 

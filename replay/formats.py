@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from devices.errors import InputError
+from replay.leap_files import is_leap, read_leap
 from replay.mcap_file import is_mcap, read_mcap
 from replay.recording import Recording
 
@@ -30,7 +31,10 @@ class Format:
 
 def formats() -> tuple[Format, ...]:
     """Every kind of recording that can be opened, the most certain to recognise first."""
-    return (Format("Bunraku recording (MCAP)", is_mcap, read_mcap),)
+    return (
+        Format("Bunraku recording (MCAP)", is_mcap, read_mcap),
+        Format("Leap Motion messages", is_leap, read_leap),
+    )
 
 
 def recognise(path: Path) -> Format:
