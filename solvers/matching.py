@@ -35,6 +35,8 @@ __all__ = ["Match", "TargetHierarchy", "Tree", "extend_to_leaf", "rank_matches"]
 
 Array = NDArray[np.float64]
 Chain = tuple[int, ...]
+# A match's pairs, limbs, stops, root and level.
+_Plan = tuple[tuple[tuple[Chain, Chain], ...], int, tuple[int, ...], int, int]
 
 SIZE_PREFERENCE: Final = 0.25  # what suits a live show: a quarter of a perfect pair for full size
 _FADE: Final = 0.05  # of the longest branch
@@ -96,7 +98,8 @@ class TargetHierarchy:
         self.tree = tree
         self.hierarchy = abstract(tree, root)
         self._candidates: dict[tuple[int, bool], _Candidates] = {}
-        self._built: dict[tuple[int, Chain, int], Match] = {}
+        self._plans: dict[tuple[int, Chain], tuple[_Plan, int]] = {}
+        self._numbers: dict[tuple[object, ...], int] = {}
         self._source: SimplifiedSource | None = None
 
     def rank(
@@ -129,20 +132,19 @@ class TargetHierarchy:
             return []
         seen = _on_screen(source.branch_vectors(pose) / max(source.length, 1e-300), source_view)
         cosines = seen @ _on_screen(candidates.vectors, view).T
-        values = cosines + size_preference * candidates.sizes
-        # Two unfoldings can hold the same match: ask for more, and keep the first of each.
-        taken, columns, merits = rank_assignments(values, candidates.starts, 2 * limit)
-        if source is not self._source:
-            self._built.clear()
-            self._source = source
-        matches: dict[tuple[int, tuple[tuple[Chain, Chain], ...]], Match] = {}
-        for which, row, merit in zip(taken.tolist(), columns, merits.tolist(), strict=True):
-            match = self._match(source, candidates.subtrees[which], tuple(row.tolist()))
-            paired = np.flatnonzero(row >= 0)
-            score = float(cosines[paired, candidates.starts[which] + row[paired]].sum())
-            key = match.root, match.pairs
-            if key not in matches:
-                matches[key] = replace(match, score=score, merit=merit)
+        sizes = size_preference * candidates.sizes
+        # Two unfoldings can hold the same match: then ask for more, and keep the first of each.
+        more = 2 if any(subtree.unfolding for subtree in candidates.subtrees) else 1
+        taken, columns, merits = rank_assignments(cosines + sizes, candidates.starts, more * limit)
+        preferred = np.where(columns < 0, 0.0, sizes[candidates.starts[taken, None] + columns])
+        scores = (merits - preferred.sum(axis=1)).tolist()
+        matches: dict[int, Match] = {}
+        for which, row, score, merit in zip(
+            taken.tolist(), columns.tolist(), scores, merits.tolist(), strict=True
+        ):
+            plan, number = self._plan(source, candidates.subtrees[which], tuple(row))
+            if number not in matches:
+                matches[number] = Match(score, *plan, merit)
         return list(matches.values())[:limit]
 
     def _for(self, branches: int, several_forks: bool) -> _Candidates:
@@ -151,14 +153,22 @@ class TargetHierarchy:
             self._candidates[key] = _gather(self.tree, self.hierarchy.subtrees, *key)
         return self._candidates[key]
 
-    def _match(self, source: SimplifiedSource, subtree: SubTree, columns: Chain) -> Match:
-        """The match without its score; its chains are worked out once."""
-        key = id(subtree), columns, len(source.chains)
-        if key not in self._built:
-            if len(self._built) >= _REMEMBERED:
-                self._built.clear()
-            self._built[key] = _build(self.tree, source, subtree, columns)
-        return self._built[key]
+    def _plan(
+        self, source: SimplifiedSource, subtree: SubTree, columns: Chain
+    ) -> tuple[_Plan, int]:
+        """A match without its score, worked out once, and a number that tells it from others."""
+        if source is not self._source or len(self._plans) >= _REMEMBERED:
+            self._source = source
+            self._plans.clear()
+            self._numbers.clear()
+        key = id(subtree), columns
+        if key not in self._plans:
+            plan = _plan(self.tree, source, subtree, columns)
+            self._plans[key] = (
+                plan,
+                self._numbers.setdefault(plan[:1] + plan[3:4], len(self._numbers)),
+            )
+        return self._plans[key]
 
 
 def rank_matches(
@@ -243,7 +253,7 @@ def _largest(subtree: SubTree) -> SubTree:
     return replace(subtree, branches=tuple(b for b in subtree.branches if b in kept))
 
 
-def _build(tree: Tree, source: SimplifiedSource, subtree: SubTree, columns: Chain) -> Match:
+def _plan(tree: Tree, source: SimplifiedSource, subtree: SubTree, columns: Chain) -> _Plan:
     """The chains that a choice of branches drives; `columns` gives each source branch's branch."""
     limbs = [
         (chain, subtree.branches[column])
@@ -259,7 +269,7 @@ def _build(tree: Tree, source: SimplifiedSource, subtree: SubTree, columns: Chai
         inner.append((source.stem, subtree.stem))
         root = subtree.stem[0]
     stops += [len(target) for _, target in inner]
-    return Match(0.0, (*pairs, *inner), len(pairs), tuple(stops), root, subtree.level, 0.0)
+    return (*pairs, *inner), len(pairs), tuple(stops), root, subtree.level
 
 
 def _place_forks(
