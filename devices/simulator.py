@@ -1,0 +1,86 @@
+"""A performer who is always there: ``sim://show``, ``sim://wave`` and so on, looping for ever."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import Self
+from urllib.parse import SplitResult
+
+import numpy as np
+
+from devices.acts import ACTS, performance
+from devices.performance import RATE, Performance
+from devices.skeleton import Skeleton, SkeletonFrame
+from devices.stream import register_scheme
+
+BACKLOG_SECONDS = 1.0
+"""What lies further back than this when a poll comes is not given any more."""
+
+
+class Simulator:
+    """A live source of motion without a sensor: 60 frames a second on the host's clock.
+
+    Args:
+        performance: what is played, again and again.
+        clock: host monotonic time [s]; the performance begins with the first poll.
+    """
+
+    def __init__(
+        self, performance: Performance, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        self._performance = performance
+        self._clock = clock
+        self._start: float | None = None
+        self._next = 0
+        self._closed = False
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """The puppet body, the same for every performance."""
+        return self._performance.skeleton
+
+    @property
+    def ended(self) -> bool:
+        """True only once it is closed."""
+        return self._closed
+
+    def poll(self) -> Sequence[SkeletonFrame]:
+        """Every frame that is due by now, oldest first, at most those of the last second."""
+        if self._closed:
+            return []
+        now = self._clock()
+        if self._start is None:
+            self._start = now
+        # A hair of a frame, so that a clock that ticks in frames is not one short by rounding.
+        due = int((now - self._start) * RATE + 1e-6) + 1
+        first = max(self._next, due - int(BACKLOG_SECONDS * RATE))
+        self._next = max(self._next, due)
+        return [self._frame(number, self._start, now) for number in range(first, due)]
+
+    def _frame(self, number: int, start: float, now: float) -> SkeletonFrame:
+        index = number % len(self._performance.times)
+        return SkeletonFrame(
+            time=start + number / RATE,
+            positions=self._performance.positions[index],
+            rotations=self._performance.rotations[index],
+            confidence=np.ones(len(self.skeleton.names)),
+            arrival=now,
+        )
+
+    def close(self) -> None:
+        """Let the performer go."""
+        self._closed = True
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
+
+
+def _open(address: SplitResult) -> Simulator:
+    return Simulator(performance(address.netloc or ACTS[0]))
+
+
+register_scheme("sim", _open)
