@@ -46,6 +46,11 @@ def register_scheme(scheme: str, opener: Opener) -> None:
     _openers[scheme] = opener
 
 
+def schemes() -> tuple[str, ...]:
+    """Kinds of address that `open_stream` can open."""
+    return tuple(sorted(_openers))
+
+
 def open_stream(url: str) -> SkeletonStream:
     """Open the source of motion at `url`, e.g. ``sim://walk`` or ``vmc://127.0.0.1:39539``.
 

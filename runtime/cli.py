@@ -1,8 +1,203 @@
-"""The command line."""
+"""The command line: `bunraku COMMAND --help` tells each command's options."""
 
 from __future__ import annotations
 
+import argparse
+import importlib
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
 
-def main() -> int:
-    """Run the command line."""
-    return 0
+from devices.errors import InputError
+
+Command = Callable[[argparse.Namespace], int]
+
+BAD_INPUT = 2
+INTERRUPTED = 130
+
+
+def size(text: str) -> tuple[int, int]:
+    """A picture's width and height from ``WxH``."""
+    width, _, height = text.lower().partition("x")
+    try:
+        pair = int(width), int(height)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"expected WIDTHxHEIGHT, as in 960x540, got {text!r}"
+        ) from None
+    if not (16 <= pair[0] <= 8192 and 16 <= pair[1] <= 8192):
+        raise argparse.ArgumentTypeError(f"each side must be 16 to 8192 pixels, got {text!r}")
+    return pair
+
+
+def positive(text: str) -> float:
+    """A finite number above 0."""
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected a number above 0, got {text!r}") from None
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"expected a finite number above 0, got {text!r}")
+    return value
+
+
+def counting(text: str) -> int:
+    """A whole number from 1."""
+    try:
+        value = int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 1, got {text!r}") from None
+    if not 1 <= value <= 1_000_000:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 1, got {text!r}")
+    return value
+
+
+class _Parser(argparse.ArgumentParser):
+    """Answers bad arguments with the one line that every command answers bad input with."""
+
+    def error(self, message: str) -> None:  # type: ignore[override]
+        raise InputError(f"{message} (see `{self.prog} --help`)")
+
+
+def _add_show_options(parser: argparse.ArgumentParser) -> None:
+    show = parser.add_argument_group("the show")
+    show.add_argument("--headless", action="store_true", help="no window")
+    show.add_argument("--size", type=size, default=(960, 540), metavar="WxH", help="of the picture")
+    show.add_argument(
+        "--fast", action="store_true", help="as fast as it can, every frame exactly once"
+    )
+    show.add_argument("--speed", type=positive, default=1.0, metavar="X", help="times the recorded")
+    show.add_argument("--loop", action="store_true", help="start again after the last frame")
+    show.add_argument("--transparent", action="store_true", help="no stage behind the character")
+    match = parser.add_argument_group("who drives what")
+    match.add_argument(
+        "--source",
+        default="whole",
+        metavar="PRESET|JOINTS",
+        help="the part of the performer that drives: whole, upper, arms, legs, left-arm, "
+        "right-arm, hand, ... or joint names with commas between",
+    )
+    match.add_argument(
+        "--match", type=counting, default=1, metavar="N", help="take the N-th best match"
+    )
+    match.add_argument(
+        "--mapping", type=Path, metavar="FILE.json", help="joints and nodes paired by hand"
+    )
+    match.add_argument(
+        "--chains",
+        choices=("extend", "stop"),
+        default="extend",
+        help="drive a matched chain on to its longest leaf, or stop at the sub-tree's root",
+    )
+    match.add_argument("--flip", action="store_true", help="mirror the turns (flip the y-axis)")
+    match.add_argument(
+        "--iterations",
+        type=counting,
+        default=2,
+        metavar="N",
+        help="ARAP iterations a frame (default 2)",
+    )
+    keep = parser.add_argument_group("what is kept")
+    keep.add_argument("--video", type=Path, metavar="OUT.mp4")
+    keep.add_argument("--frames", type=Path, metavar="DIR", help="a PNG for each frame")
+    keep.add_argument("--cache", type=Path, metavar="OUT.pc2", help="deformed vertices, for each")
+    keep.add_argument("--report", type=Path, metavar="OUT.json", help="the show in figures")
+    keep.add_argument("--record", type=Path, metavar="OUT.mcap", help="the performer's frames")
+    keep.add_argument(
+        "--export",
+        type=Path,
+        metavar="OUT.{glb,usdc,usda,bvh}",
+        help="the performed character, for other programs",
+    )
+
+
+def _characters(parser: argparse.ArgumentParser, *, required: bool) -> None:
+    parser.add_argument(
+        "--character",
+        action="append",
+        required=required,
+        metavar="C",
+        help="a mesh (obj, ply, stl, off, glb, gltf, vrm) or a built-in character; may be repeated",
+    )
+
+
+def _command(module: str, function: str) -> Command:
+    """A command that is imported when it is run, so that `--help` answers at once."""
+
+    def run(options: argparse.Namespace) -> int:
+        command: Command = getattr(importlib.import_module(f"runtime.commands.{module}"), function)
+        return command(options)
+
+    return run
+
+
+def parser() -> argparse.ArgumentParser:
+    """Every command with its options."""
+    top = _Parser(
+        prog="bunraku",
+        description="A performer moves, and any character on the screen moves with them.",
+    )
+    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
+
+    def add(name: str, run: Command, text: str) -> argparse.ArgumentParser:
+        command = commands.add_parser(name, help=text, description=text)
+        command.set_defaults(run=run)
+        return command
+
+    demo = add(
+        "demo", _command("show", "demo"), "one performer, several characters, nothing else needed"
+    )
+    _characters(demo, required=False)
+    _add_show_options(demo)
+
+    replay = add("replay", _command("show", "replay"), "a recorded stream drives a character")
+    replay.add_argument("recording", type=Path, metavar="RECORDING")
+    _characters(replay, required=True)
+    _add_show_options(replay)
+
+    live = add("live", _command("show", "live"), "a live stream drives a character")
+    live.add_argument("--device", required=True, metavar="URL", help="as `bunraku devices` lists")
+    _characters(live, required=True)
+    _add_show_options(live)
+
+    record = add(
+        "record", _command("record", "record"), "a live stream goes to a file, without a character"
+    )
+    record.add_argument("--device", required=True, metavar="URL")
+    record.add_argument("out", type=Path, metavar="OUT.mcap")
+    record.add_argument("--seconds", type=positive, help="stop after this long")
+
+    add(
+        "devices",
+        _command("info", "devices_there"),
+        "the kinds of devices and built-in characters there are",
+    )
+    info = add("info", _command("info", "info"), "what is in a recording or a character's file")
+    info.add_argument("file", metavar="FILE")
+    doctor = add("doctor", _command("doctor", "doctor"), "what is wrong with this machine")
+    doctor.add_argument("--warm", action="store_true", help="compile the solvers ahead of time")
+    bench = add("bench", _command("bench", "bench"), "how fast it is here")
+    bench.add_argument("name", nargs="?", metavar="NAME", help="arap, tick or match; all if absent")
+    bench.add_argument("--json", type=Path, metavar="FILE", help="write the figures there as well")
+    return top
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; the exit code is 0, 2 for bad input, 130 after Ctrl-C."""
+    try:
+        options = parser().parse_args(arguments)
+        run: Command = options.run
+        return run(options)
+    except InputError as error:
+        line = " ".join(str(error).split())
+        print(f"bunraku: error: {line}", file=sys.stderr)
+        return BAD_INPUT
+    except KeyboardInterrupt:
+        return INTERRUPTED
+    except BrokenPipeError:
+        sys.stderr.close()
+        return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

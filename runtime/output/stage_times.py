@@ -9,7 +9,7 @@ from time import perf_counter
 
 import numpy as np
 
-STAGES = ("poll", "match", "retarget", "deform", "render", "frame")
+STAGES = ("poll", "match", "retarget", "deform", "render", "publish", "frame")
 
 
 class StageTimes:

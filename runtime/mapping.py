@@ -1,0 +1,117 @@
+"""Which part of the performer drives which part of the character, and the file that says so."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from devices.errors import InputError
+from devices.skeleton import Skeleton
+
+MAX_FILE = 1 << 20  # bytes; a mapping is a page of names, not a data set
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """One source polyline that drives one target polyline (AniMesh section 5.2).
+
+    Attributes:
+        source: joint indices from the root side outward, at least two.
+        target: node indices from the root side outward, at least two.
+        flip: turn the target's y-axis round, which mirrors the turns (end of section 5.2).
+    """
+
+    source: tuple[int, ...]
+    target: tuple[int, ...]
+    flip: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Mapping:
+    """Everything that drives one character.
+
+    Attributes:
+        drives: the pairs of polylines, those nearer to the target's root first.
+        score: the match's similarity, the sum of cosines of section 4.2; NaN when made by hand.
+        root: the target node that all polylines lead away from, where it is known.
+    """
+
+    drives: tuple[Drive, ...]
+    score: float = float("nan")
+    root: int | None = None
+
+
+def read_mapping(path: Path, source: Skeleton, target: Skeleton) -> Mapping:
+    """Read a mapping made by hand.
+
+    The file holds ``{"pairs": [{"source": [...], "target": [...], "flip": false}, ...]}``; source
+    joints are names, target nodes are names or numbers, both from the root side outward. It is
+    what a report's ``match`` holds, so a mapping can be taken from there and edited.
+
+    Raises:
+        InputError: the file is not there, is not such JSON, or names what is not there.
+    """
+    try:
+        text = path.read_bytes()[: MAX_FILE + 1]
+        if len(text) > MAX_FILE:
+            raise InputError(f"{path} is too large for a mapping (over {MAX_FILE} bytes)")
+        pairs = json.loads(text)["pairs"]
+        drives = tuple(_drive(pair, source, target) for pair in pairs)
+    except OSError as error:
+        raise InputError(f"cannot read the mapping {path}: {error.strerror or error}") from error
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise InputError(
+            f'{path} is not a mapping: expected {{"pairs": [{{"source": [joint names], '
+            f'"target": [node ids]}}]}} ({type(error).__name__}: {error})'
+        ) from error
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    if not drives:
+        raise InputError(f"{path} maps nothing: its `pairs` is empty")
+    return Mapping(drives)
+
+
+def _drive(pair: dict[str, Any], source: Skeleton, target: Skeleton) -> Drive:
+    drive = Drive(
+        source=tuple(source.index(str(name)) for name in pair["source"]),
+        target=tuple(_node(node, target) for node in pair["target"]),
+        flip=bool(pair.get("flip", False)),
+    )
+    for end, chain in (("source", drive.source), ("target", drive.target)):
+        if len(chain) < 2 or len(set(chain)) != len(chain):
+            raise InputError(f"each {end} polyline needs two or more different joints")
+    for near, far in itertools.pairwise(drive.target):
+        if target.parents[far] != near and target.parents[near] != far:
+            raise InputError(
+                f"target nodes {target.names[near]} and {target.names[far]} share no bone"
+            )
+    return drive
+
+
+def _node(node: object, target: Skeleton) -> int:
+    if isinstance(node, str):
+        return target.index(node)
+    if isinstance(node, bool) or not isinstance(node, int):
+        raise InputError(f"a target node is a name or a number, got {node!r}")
+    if not 0 <= node < len(target.names):
+        last = len(target.names) - 1
+        raise InputError(f"there is no target node {node}; they go from 0 to {last}")
+    return node
+
+
+def mapping_as_json(mapping: Mapping, source: Skeleton) -> dict[str, Any]:
+    """Give a mapping as `read_mapping` reads it, with node numbers for the target."""
+    return {
+        "score": mapping.score if mapping.score == mapping.score else None,
+        "pairs": [
+            {
+                "source": [source.names[joint] for joint in drive.source],
+                "target": list(drive.target),
+                "flip": drive.flip,
+            }
+            for drive in mapping.drives
+        ],
+    }

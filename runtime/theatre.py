@@ -1,0 +1,127 @@
+"""The house: stage, camera, the puppets on it and the mirror that shows the performer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from devices.skeleton import Skeleton
+from runtime.character import Character
+from runtime.mapping import Mapping
+from runtime.performer import Pose
+from runtime.puppet import Motion, Puppet
+from runtime.render.camera import front_camera
+from runtime.render.inset import SkeletonInset
+from runtime.render.stage import Stage
+
+GAP = 0.18  # metres of floor between two characters
+ROOM = 0.12  # share of its size that a character may move beyond its rest pose and stay in view
+
+CHAIN_COLOURS = np.array(  # linear RGB, told apart also by those who see fewer colours
+    [
+        [1.00, 0.32, 0.05],
+        [0.05, 0.42, 1.00],
+        [0.98, 0.75, 0.05],
+        [0.10, 0.75, 0.30],
+        [0.85, 0.12, 0.60],
+        [0.10, 0.75, 0.85],
+        [0.60, 0.35, 1.00],
+        [0.75, 0.75, 0.75],
+    ]
+)
+
+
+class Theatre:
+    """Puts characters side by side on one stage and shows what they do.
+
+    Args:
+        context: the GL context of this thread.
+        size: width and height of the picture [px].
+        puppets: who is on stage, from left to right.
+        performer: the skeleton shown in the mirror.
+        transparent: no house and no floor.
+    """
+
+    def __init__(
+        self,
+        context: moderngl.Context,
+        size: tuple[int, int],
+        puppets: Sequence[Puppet],
+        performer: Skeleton,
+        *,
+        transparent: bool = False,
+    ) -> None:
+        self.stage = Stage(context, size, transparent=transparent)
+        self._puppets = puppets
+        self._captions = len(puppets) > 1
+        places = _side_by_side([puppet.character for puppet in puppets])
+        self._actors = [
+            self.stage.add(
+                puppet.character,
+                position=(place, 0.0, 0.0),
+                caption=puppet.character.name if self._captions else "",
+            )
+            for puppet, place in zip(puppets, places, strict=True)
+        ]
+        self._inset = None if transparent else SkeletonInset(performer.parents)
+        self.highlights = not transparent
+        self.camera = front_camera()
+        self.frame_all()
+
+    def frame_all(self) -> None:
+        """Move the camera to where every character is in view, with room to move."""
+        boxes = self.stage.boxes
+        room = ROOM * np.ptp(boxes, axis=1).max(axis=1)[:, None]
+        boxes[:, 0, ::2] -= room
+        boxes[:, 1] += room
+        self.camera = self.camera.frame(boxes, self.stage.aspect)
+
+    def show(self, pose: Pose | None, motions: Sequence[Motion]) -> None:
+        """Draw the puppets as they are now, and the performer in the mirror."""
+        for actor, puppet, motion in zip(self._actors, self._puppets, motions, strict=True):
+            actor.update(motion.vertices)
+            chains = puppet.chains if self.highlights else []
+            actor.highlight(chains, _colours(len(chains)))
+        if self._inset is not None and pose is not None:
+            self._inset.update(
+                pose.seen,
+                colours=_joint_colours(len(pose.seen), self._puppets[0].mapping),
+                dimmed=pose.filled,
+            )
+        self.stage.draw(self.camera, self._inset if pose is not None else None)
+
+    def picture(self) -> NDArray[np.uint8]:
+        """The newest picture (H, W, 4): sRGB with straight alpha, top row first."""
+        return self.stage.read()
+
+    def close(self) -> None:
+        """Free the stage."""
+        self.stage.release()
+
+
+def _side_by_side(characters: Sequence[Character]) -> list[float]:
+    """Where on the x axis [m] each character stands, the row centred."""
+    places, right = [], 0.0
+    for character in characters:
+        low, high = character.vertices[:, 0].min(), character.vertices[:, 0].max()
+        places.append(right - float(low))
+        right += float(high - low) + GAP
+    middle = (right - GAP) / 2.0
+    if len(characters) == 1:
+        return [0.0]
+    return [place - middle for place in places]
+
+
+def _colours(count: int) -> list[NDArray[np.float64]]:
+    return [CHAIN_COLOURS[index % len(CHAIN_COLOURS)] for index in range(count)]
+
+
+def _joint_colours(joints: int, mapping: Mapping) -> NDArray[np.float64]:
+    """Linear RGB of each joint (J, 3) by the chain that it drives; NaN where it drives nothing."""
+    colours = np.full((joints, 3), np.nan)
+    for drive, colour in zip(mapping.drives, _colours(len(mapping.drives)), strict=True):
+        colours[list(drive.source[1:])] = colour
+    return colours

@@ -1,0 +1,210 @@
+"""The window on the desktop: its OpenGL context, its camera under the mouse, and what is typed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import glfw
+import moderngl
+
+from devices.errors import InputError
+from runtime.render.camera import Camera, front_camera
+from runtime.render.context import current_context
+
+ORBIT_SPEED = 0.006  # rad a pixel
+ZOOM_STEP = 1.12  # a notch of the wheel
+
+
+@dataclass(frozen=True, slots=True)
+class KeyPressed:
+    """A key went down or repeats.
+
+    Attributes:
+        key: what is printed on it in lower case, or one of the names in `KEY_NAMES`.
+        shift, control: whether that modifier was held.
+    """
+
+    key: str
+    shift: bool = False
+    control: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class FilesDropped:
+    """Files were dragged onto the window."""
+
+    paths: tuple[Path, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Resized:
+    """The window's framebuffer has another size [px]."""
+
+    size: tuple[int, int]
+
+
+Event = KeyPressed | FilesDropped | Resized
+
+KEY_NAMES = {
+    glfw.KEY_SPACE: "space",
+    glfw.KEY_ESCAPE: "escape",
+    glfw.KEY_ENTER: "enter",
+    glfw.KEY_TAB: "tab",
+    glfw.KEY_BACKSPACE: "backspace",
+    glfw.KEY_DELETE: "delete",
+    glfw.KEY_LEFT: "left",
+    glfw.KEY_RIGHT: "right",
+    glfw.KEY_UP: "up",
+    glfw.KEY_DOWN: "down",
+    glfw.KEY_HOME: "home",
+    glfw.KEY_END: "end",
+    **{getattr(glfw, f"KEY_F{number}"): f"f{number}" for number in range(1, 13)},
+}
+
+
+class Window:
+    """A window with an OpenGL 3.3 context, current on this thread.
+
+    The left button orbits the camera, the right or middle one pans, the wheel zooms.
+
+    Attributes:
+        camera: what the mouse moves; set it to frame something else.
+        context: the window's GL context.
+        handle: glfw's window, for a panel that draws over the picture.
+        mouse_taken, keys_taken: set while such a panel uses the mouse or the keyboard.
+
+    Raises:
+        InputError: there is no display, or no OpenGL 3.3 on it.
+    """
+
+    def __init__(self, title: str, size: tuple[int, int], *, visible: bool = True) -> None:
+        self.handle: Any = _open_window(title, size, visible)
+        try:
+            self.context: moderngl.Context = current_context(glfw.get_proc_address)
+        except InputError:
+            glfw.destroy_window(self.handle)
+            raise
+        self.camera: Camera = front_camera()
+        self.mouse_taken = False
+        self.keys_taken = False
+        self._events: list[Event] = []
+        self._cursor = glfw.get_cursor_pos(self.handle)
+        self._dragging: int | None = None
+        glfw.swap_interval(1)
+        glfw.set_key_callback(self.handle, self._on_key)
+        glfw.set_mouse_button_callback(self.handle, self._on_button)
+        glfw.set_cursor_pos_callback(self.handle, self._on_cursor)
+        glfw.set_scroll_callback(self.handle, self._on_scroll)
+        on_drop: Any = self._on_drop  # glfw annotates the bare C callback
+        glfw.set_drop_callback(self.handle, on_drop)
+        glfw.set_framebuffer_size_callback(self.handle, self._on_resize)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height of the framebuffer [px]; larger than the window on dense displays."""
+        width, height = glfw.get_framebuffer_size(self.handle)
+        return max(width, 1), max(height, 1)
+
+    @property
+    def framebuffer(self) -> moderngl.Framebuffer:
+        """What `swap` shows."""
+        return self.context.screen
+
+    @property
+    def should_close(self) -> bool:
+        """Whether the user asked to close the window."""
+        return bool(glfw.window_should_close(self.handle))
+
+    def poll(self) -> list[Event]:
+        """Move the camera by what the mouse did; return what else happened, oldest first."""
+        glfw.poll_events()
+        events, self._events = self._events, []
+        return events
+
+    def swap(self) -> None:
+        """Show what was drawn into the framebuffer."""
+        glfw.swap_buffers(self.handle)
+
+    def set_title(self, title: str) -> None:
+        """Write another title on the window."""
+        glfw.set_window_title(self.handle, title)
+
+    def close(self) -> None:
+        """Close the window; its context ends with it."""
+        if self.handle is not None:
+            glfw.destroy_window(self.handle)
+            self.handle = None
+
+    def __enter__(self) -> Window:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _on_key(self, _: object, key: int, scancode: int, action: int, mods: int) -> None:
+        if action == glfw.RELEASE or self.keys_taken:
+            return
+        name = KEY_NAMES.get(key) or glfw.get_key_name(key, scancode)
+        if name:
+            shift, control = bool(mods & glfw.MOD_SHIFT), bool(mods & glfw.MOD_CONTROL)
+            self._events.append(KeyPressed(name.lower(), shift, control))
+
+    def _on_button(self, _: object, button: int, action: int, mods: int) -> None:
+        if action == glfw.RELEASE:
+            self._dragging = None
+        elif not self.mouse_taken:
+            shifted = button == glfw.MOUSE_BUTTON_LEFT and mods & glfw.MOD_SHIFT
+            self._dragging = glfw.MOUSE_BUTTON_MIDDLE if shifted else button
+
+    def _on_cursor(self, _: object, x: float, y: float) -> None:
+        right, down = x - self._cursor[0], y - self._cursor[1]
+        self._cursor = (x, y)
+        if self._dragging is None:
+            return
+        if self._dragging == glfw.MOUSE_BUTTON_LEFT:
+            self.camera = self.camera.orbit(-ORBIT_SPEED * right, ORBIT_SPEED * down)
+        else:
+            height = max(glfw.get_window_size(self.handle)[1], 1)
+            self.camera = self.camera.pan(-right / height, down / height)
+
+    def _on_scroll(self, _: object, right: float, up: float) -> None:
+        if not self.mouse_taken:
+            self.camera = self.camera.zoom(ZOOM_STEP**up)
+
+    def _on_drop(self, _: object, paths: list[str]) -> None:
+        self._events.append(FilesDropped(tuple(Path(path) for path in paths)))
+
+    def _on_resize(self, _: object, width: int, height: int) -> None:
+        self._events.append(Resized((max(width, 1), max(height, 1))))
+
+
+def _open_window(title: str, size: tuple[int, int], visible: bool) -> Any:
+    """Ask glfw for a window and make its context current."""
+    problems: list[str] = []
+    report: Any = lambda _code, text: problems.append(text.decode("utf-8", "replace"))  # noqa: E731
+    glfw.set_error_callback(report)
+    handle = None
+    if glfw.init():
+        for hint, value in (
+            (glfw.CONTEXT_VERSION_MAJOR, 3),
+            (glfw.CONTEXT_VERSION_MINOR, 3),
+            (glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE),
+            (glfw.OPENGL_FORWARD_COMPAT, True),
+            (glfw.SAMPLES, 0),  # the stage has its own multisampling
+            (glfw.VISIBLE, visible),
+        ):
+            glfw.window_hint(hint, value)
+        handle = glfw.create_window(*size, title, None, None)
+    if not handle:
+        reason = problems[-1] if problems else "no reason given"
+        raise InputError(f"could not open a window ({reason}); add --headless to go without one")
+    glfw.make_context_current(handle)
+    return handle
