@@ -12,6 +12,7 @@ Matrix = NDArray[np.float64]
 
 DEFAULT_PITCH = math.radians(9.0)
 HIGHEST_PITCH = math.radians(80.0)
+HEADROOM = 0.3  # how far down, from 0 to 1, actors stand in a picture higher than they need
 LOWEST_PITCH = math.radians(1.0)  # the eye stays above the floor
 
 
@@ -69,20 +70,22 @@ class Camera:
 
         A point (x, y, z) in the camera's axes lies inside the right edge of slope t, seen from
         distance d with the centre at c, when d t + c >= x + z t; likewise for the left edge. The
-        largest of each over all corners give c and the smallest d in closed form.
+        largest of each over all corners give c and the smallest d in closed form. Room that is left
+        over goes above heads rather than below feet.
 
         Args:
             bounds: (2, 3) or (B, 2, 3) [m]; least and greatest corners of one box or several.
             aspect: width over height of the picture.
             margin: free part of the picture on each side, in [0, 0.5).
         """
-        corners = _corners(np.asarray(bounds, dtype=np.float64).reshape(-1, 2, 3))
+        corners = box_corners(np.asarray(bounds, dtype=np.float64).reshape(-1, 2, 3))
         seen = corners @ self.view_rotation.T  # (8 B, 3)
         slope_y = math.tan(self.fov / 2.0) * (1.0 - 2.0 * margin)
         centre_x, distance_x = _tightest(seen[:, 0], seen[:, 2], slope_y * aspect)
         centre_y, distance_y = _tightest(seen[:, 1], seen[:, 2], slope_y)
         nearest, middle = seen[:, 2].max(), (seen[:, 2].max() + seen[:, 2].min()) / 2.0
         depth = max(distance_x, distance_y, nearest + 1e-3)
+        centre_y += HEADROOM * (depth - distance_y) * slope_y
         rotation = self.view_rotation
         target = np.array([centre_x, centre_y, middle]) @ rotation
         eye = np.array([centre_x, centre_y, depth]) @ rotation
@@ -132,8 +135,8 @@ def _placed(camera: Camera, eye: ArrayLike, target: ArrayLike) -> Camera:
     )
 
 
-def _corners(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The eight corners of each box (B, 2, 3) as points (8 B, 3)."""
+def box_corners(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The eight corners of boxes (B, 2, 3) as points (8 B, 3)."""
     pick = np.array(list(np.ndindex(2, 2, 2)))  # (8, 3)
     return boxes[:, pick, np.arange(3)].reshape(-1, 3)
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, ImageDraw, ImageFont
 
-from runtime.render.programs import link
+from runtime.render.programs import link, release_all
 
 INK = (0.93, 0.80, 0.60, 0.78)  # encoded sRGB and opacity: old ivory
 LONGEST = 40
@@ -47,8 +47,7 @@ class CaptionPainter:
 
     def release(self) -> None:
         """Free its GL objects."""
-        for thing in (self._array, self._program, *self._set.values()):
-            thing.release()
+        release_all(self._array, self._program, *self._set.values())
 
 
 def _typeset(text: str, points: int) -> NDArray[np.uint8]:

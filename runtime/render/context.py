@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Callable
 from contextlib import suppress
+from typing import Any
 
 import moderngl
 
@@ -25,12 +26,12 @@ def headless_context(*, libegl: str = "libEGL.so.1", libgl: str = "libGL.so.1") 
     """
     if not sys.platform.startswith("linux"):
         return _other_platform()
+    egl: dict[str, Any] = {"backend": "egl", "libegl": libegl, "libgl": libgl}
     refusals = []
     for device in range(EGL_DEVICES):
+        egl["device_index"] = device
         try:
-            context = moderngl.create_context(
-                standalone=True, backend="egl", libegl=libegl, libgl=libgl, device_index=device
-            )
+            context = moderngl.create_context(standalone=True, **egl)
         except Exception as error:  # glcontext raises bare Exception for every failure
             refusals.append(str(error))
         else:
@@ -52,24 +53,25 @@ def _other_platform() -> moderngl.Context:
 class _Loader:
     """Finds GL functions through the library that made the current context."""
 
-    def __init__(self, address_of: Callable[[str], int | None]) -> None:
+    def __init__(self, address_of: Callable[[str], Any]) -> None:
         self._address_of = address_of
 
     def load_opengl_function(self, name: str) -> int:
-        return self._address_of(name) or 0
+        return int(self._address_of(name) or 0)
 
     def release(self) -> None:
         """The window owns the context and ends it."""
 
 
-def current_context(address_of: Callable[[str], int | None]) -> moderngl.Context:
+def current_context(address_of: Callable[[str], Any]) -> moderngl.Context:
     """Wrap the GL context that is current on this thread; `address_of` looks functions up.
 
     Raises:
         InputError: the current context is older than OpenGL 3.3.
     """
     try:
-        return moderngl.create_context(context=_Loader(address_of))
+        loader: Any = _Loader(address_of)
+        return moderngl.create_context(context=loader)
     except Exception as error:  # moderngl raises bare Exception for every failure
         raise InputError(
             f"the window's OpenGL is not usable ({error}); Bunraku needs OpenGL 3.3: "

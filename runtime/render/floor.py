@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -10,9 +11,9 @@ from numpy.typing import NDArray
 
 from runtime.render.actor import Actor
 from runtime.render.frame import SHADOW_SIZE, Lighting
-from runtime.render.programs import link
+from runtime.render.programs import link, release_all
 
-MASK_SIZE = (384, 256)
+MASK_SIZE = (320, 192)
 HEIGHT_SIZE = (256, 256)
 REFLECTION_REACH = 0.9  # how far in front of an actor the floor may still show it [m]
 
@@ -49,8 +50,7 @@ class ShadowMaps:
 
     def release(self) -> None:
         """Free its GL objects."""
-        for thing in (self._key_target, self._height_target, self.key, self.height):
-            thing.release()
+        release_all(self._key_target, self._height_target, self.key, self.height)
 
 
 class Floor:
@@ -84,22 +84,11 @@ class Floor:
         self._mask.use(0)
         reflection.use(1)
         self._context.enable_only(moderngl.BLEND)
-        self._context.blend_func = (
-            moderngl.ONE,
-            moderngl.SRC_ALPHA,
-            moderngl.ZERO,
-            moderngl.ONE,
-        )
+        add_and_keep: Any = (moderngl.ONE, moderngl.SRC_ALPHA, moderngl.ZERO, moderngl.ONE)
+        self._context.blend_func = add_and_keep
         self._array.render(moderngl.TRIANGLE_STRIP, vertices=4)
 
     def release(self) -> None:
         """Free its GL objects."""
-        for thing in (
-            self._array,
-            self._program,
-            self._mask_target,
-            self._mask,
-            self._mask_array,
-            self._mask_program,
-        ):
-            thing.release()
+        release_all(self._array, self._program, self._mask_array, self._mask_program)
+        release_all(self._mask_target, self._mask)

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from runtime.render.camera import Camera
+from runtime.render.camera import Camera, box_corners
 
 Box = NDArray[np.float64]  # (2, 3) least and greatest corner [m]
 
 MAX_POOLS = 16
-KEY_DIRECTION = np.array([-0.46, 0.92, 0.66]) / np.linalg.norm([-0.46, 0.92, 0.66])
+KEY_DIRECTION = np.array([-0.66, 0.90, 0.52]) / np.linalg.norm([-0.66, 0.90, 0.52])
 
 FRAME = np.dtype(
     [
@@ -56,8 +56,7 @@ def lighting(boxes: NDArray[np.float64]) -> Lighting:
     Extents are rounded outward to whole steps, so that the maps stand still while actors move
     within them and shadows do not shimmer.
     """
-    pick = np.array(list(np.ndindex(2, 2, 2)))
-    corners = boxes[:, pick, np.arange(3)].reshape(-1, 3)
+    corners = box_corners(boxes)
     landing = corners - KEY_DIRECTION * (corners[:, 1:2] / KEY_DIRECTION[1])
     reach = np.vstack([corners, landing])
     axes = _light_axes()
@@ -138,3 +137,18 @@ def frame_block(
     block["picture"] = (width, height, height / (2.0 * np.tan(camera.fov / 2.0)), 0.0)
     block["pools"][: len(pools), :3] = pools
     return block
+
+
+def covered(
+    camera: Camera, size: tuple[int, int], boxes: NDArray[np.float64]
+) -> tuple[int, int, int, int]:
+    """The part of the picture that boxes (B, 2, 3) can touch: left, bottom, width, height [px]."""
+    width, height = size
+    points = np.pad(box_corners(boxes), ((0, 0), (0, 1)), constant_values=1.0)
+    clip = points @ (camera.projection(width / height) @ camera.view).T
+    if not len(points) or clip[:, 3].min() < camera.near:
+        return 0, 0, width, height
+    pixels = (clip[:, :2] / clip[:, 3:] * 0.5 + 0.5) * (width, height)
+    low = np.clip(np.floor(pixels.min(axis=0)) - 1, 0, size).astype(int)
+    high = np.clip(np.ceil(pixels.max(axis=0)) + 1, 0, size).astype(int)
+    return int(low[0]), int(low[1]), int(high[0] - low[0]), int(high[1] - low[1])

@@ -6,7 +6,7 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from runtime.render.programs import link
+from runtime.render.programs import link, release_all
 from runtime.render.tubes import TubePainter, Tubes, tubes
 
 IDLE = np.array([0.62, 0.60, 0.56])  # a joint that drives nothing: bare wood
@@ -35,7 +35,7 @@ class SkeletonInset:
         positions: NDArray[np.float64],
         *,
         colours: NDArray[np.float64] | None = None,
-        dimmed: NDArray[np.bool_] | None = None,
+        dimmed: NDArray[np.bool] | None = None,
         view_rotation: NDArray[np.float64] | None = None,
     ) -> None:
         """Take one frame of the performer.
@@ -47,19 +47,18 @@ class SkeletonInset:
             view_rotation: (3, 3) world to the viewer's axes; None: from the front.
         """
         seen = positions if view_rotation is None else positions @ view_rotation.T
-        known = np.isfinite(seen).all(axis=1)
+        known = np.asarray(np.isfinite(seen).all(axis=1), dtype=np.bool)
         if not known.any():
             self._capsules = np.empty((0, 13), dtype=np.float32)
             return
-        self._follow(seen[known])
+        centre = self._follow(seen[known])
         count = len(self.parents)
-        painted = np.full((count, 3), np.nan) if colours is None else np.asarray(colours)
-        faint = np.zeros(count, dtype=bool) if dimmed is None else np.asarray(dimmed)
-        assert self._centre is not None
-        placed = (seen - [*self._centre, 0.0]) / self._half
+        painted = np.full((count, 3), np.nan) if colours is None else colours
+        faint: NDArray[np.bool] = np.zeros(count, dtype=np.bool) if dimmed is None else dimmed
+        placed = (seen - [*centre, 0.0]) / self._half
         self._capsules = _skeleton_tubes(placed, self.parents, painted, faint, known)
 
-    def _follow(self, points: NDArray[np.float64]) -> None:
+    def _follow(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
         low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
         middle = (low + high) / 2.0
         reach = max(float(np.linalg.norm(points[:, :2] - middle, axis=1).max()), 1e-6)
@@ -68,7 +67,9 @@ class SkeletonInset:
         self._half = max(reach, self._half - SHRINK * (self._half - reach))
         spare = self._half - (high - low) / 2.0
         slack = 0.35 * np.maximum(spare, 0.0)
-        self._centre = np.clip(self._centre, middle - slack, middle + slack)
+        centre: NDArray[np.float64] = np.clip(self._centre, middle - slack, middle + slack)
+        self._centre = centre
+        return centre
 
     @property
     def capsules(self) -> Tubes:
@@ -80,8 +81,8 @@ def _skeleton_tubes(
     joints: NDArray[np.float64],
     parents: NDArray[np.int64],
     colours: NDArray[np.float64],
-    dimmed: NDArray[np.bool_],
-    known: NDArray[np.bool_],
+    dimmed: NDArray[np.bool],
+    known: NDArray[np.bool],
 ) -> Tubes:
     """Bones from parent to child in the child's colour, and beads; far ones first."""
     driven = np.isfinite(colours).all(axis=1)
@@ -89,7 +90,7 @@ def _skeleton_tubes(
     opacity = np.where(dimmed, 0.28, 1.0)
     child = np.flatnonzero((parents >= 0) & known & known[parents])
     crowd = np.clip(25.0 / max(len(child), 1), 0.45, 1.0)  # thin where joints are many
-    width = np.where(driven, 0.030, 0.020) * crowd
+    width = np.where(driven, 0.046, 0.030) * crowd
     bones = tubes(
         joints[parents[child]],
         joints[child],
@@ -143,9 +144,8 @@ class InsetPainter:
             least=0.7,
         )
         target.viewport = (0, 0, width, height)
-        target.scissor = None
+        target.scissor = (0, 0, width, height)
 
     def release(self) -> None:
         """Free its GL objects."""
-        self._array.release()
-        self._program.release()
+        release_all(self._array, self._program)

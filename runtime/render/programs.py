@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from importlib import resources
+from typing import Protocol
 
 import moderngl
 
@@ -19,8 +20,9 @@ def link(
         vertex_shader=_source(f"{vertex}.vert", defines),
         fragment_shader=_source(f"{fragment}.frag", defines),
     )
-    if "Frame" in program:
-        program["Frame"].binding = FRAME_BINDING
+    block = program.get("Frame", None)
+    if isinstance(block, moderngl.UniformBlock):
+        block.binding = FRAME_BINDING
     return program
 
 
@@ -31,3 +33,17 @@ def _source(name: str, defines: tuple[str, ...]) -> str:
 
 def _read(name: str) -> str:
     return resources.files("runtime.render").joinpath("shaders", name).read_text("utf-8")
+
+
+class Releasable(Protocol):
+    """Something that holds GL objects."""
+
+    def release(self) -> None:
+        """Free them."""
+
+
+def release_all(*things: Releasable | None) -> None:
+    """Free what is there, in the order given."""
+    for thing in things:
+        if thing is not None:
+            thing.release()

@@ -1,4 +1,4 @@
-"""Normals of a deforming surface: smooth across seams of the file, sharp at creases of the shape."""
+"""Normals of a deforming surface: smooth across the file's seams, sharp at the shape's creases."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class DrawVertices:
 
 
 def split_vertices(character: Character, *, crease: float = CREASE) -> DrawVertices:
-    """Split a character's vertices for drawing; edges that turn by more than `crease` stay sharp."""
+    """Split a character's vertices for drawing; edges that turn more than `crease` stay sharp."""
     faces = np.ascontiguousarray(character.faces, dtype=np.int32)
     group = smoothing_groups(character.vertices, faces, crease)
     surface = character.surface
@@ -98,8 +98,23 @@ def _unit_face_normals(
     return cross / np.maximum(length, 1e-300)[:, None], length
 
 
-@njit(cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
-def fill_draw_vertices(
+def is_closed(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> bool:
+    """Whether no inside can be seen: every piece watertight and turned outward."""
+    tail, head = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    count = len(vertices)
+    forward = tail.astype(np.int64) * count + head
+    backward = head.astype(np.int64) * count + tail
+    if len(np.unique(forward)) != len(forward) or not np.isin(forward, backward).all():
+        return False
+    links = coo_array((np.ones(len(tail), dtype=np.int8), (tail, head)), (count, count))
+    piece = connected_components(links, directed=False)[1][faces[:, 0]]
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    volume = np.bincount(piece, weights=np.einsum("ij,ij->i", a, np.cross(b, c)))
+    return bool((volume[np.unique(piece)] > 0.0).all())
+
+
+@njit(cache=True, error_model="numpy")
+def fill_draw_vertices(  # noqa: PLR0917  (numba takes arrays by position)
     vertices: NDArray[np.float64],
     faces: NDArray[np.int32],
     group_start: NDArray[np.int32],
@@ -127,11 +142,7 @@ def fill_draw_vertices(
         if double_area == 0.0:
             corner_normals[3 * f : 3 * f + 3] = 0.0
             continue
-        uv, uu, vv = (
-            ux * vx + uy * vy + uz * vz,
-            ux * ux + uy * uy + uz * uz,
-            vx * vx + vy * vy + vz * vz,
-        )
+        uv, uu = ux * vx + uy * vy + uz * vz, ux * ux + uy * uy + uz * uz
         at_a = math.atan2(double_area, uv)
         at_b = math.atan2(double_area, uu - uv)
         for k in range(3):

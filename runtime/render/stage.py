@@ -12,9 +12,9 @@ from runtime.render.actor import Actor, ActorPrograms
 from runtime.render.camera import Camera
 from runtime.render.caption import CaptionPainter
 from runtime.render.floor import Floor, ShadowMaps
-from runtime.render.frame import MAX_POOLS, Lighting, frame_block, lighting
+from runtime.render.frame import MAX_POOLS, Lighting, covered, frame_block, lighting
 from runtime.render.inset import InsetPainter, SkeletonInset
-from runtime.render.programs import FRAME_BINDING, link
+from runtime.render.programs import FRAME_BINDING, link, release_all
 from runtime.render.targets import Targets
 from runtime.render.tubes import TubePainter
 
@@ -70,6 +70,7 @@ class Stage:
         self._mirrored = context.buffer(reserve=block.nbytes, dynamic=True)
         self._targets = self._make_targets(size)
         self._kept_backdrop = b""
+        self._seen = (0, 0, *size)
 
     def _make_targets(self, size: tuple[int, int]) -> Targets:
         largest = min(int(self._context.info["GL_MAX_TEXTURE_SIZE"]), 16384)
@@ -92,7 +93,7 @@ class Stage:
 
     @property
     def boxes(self) -> NDArray[np.float64]:
-        """(A, 2, 3) [m] what each actor fills now: least and greatest corner, for `Camera.frame`."""
+        """(A, 2, 3) [m] least and greatest corner of what each actor fills now."""
         return np.array([actor.box for actor in self._actors]).reshape(-1, 2, 3)
 
     def add(
@@ -136,6 +137,7 @@ class Stage:
         """Draw the actors as they are now, seen by `camera`; `inset` shows the performer."""
         light = lighting(self.boxes if self._actors else _EMPTY)
         pools = np.array([actor.pool for actor in self._actors]) if self._actors else _NO_POOLS
+        self._seen = covered(camera, self.size, self.boxes)
         self._share(camera, light, pools)
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._maps.draw(self._actors, light, contact=not self._transparent)
@@ -165,11 +167,13 @@ class Stage:
             program["shadow_texel"] = 1.8 * light.texel
         self._maps.key.use(0)
         self._targets.actors.use()
-        self._targets.actors.clear()
+        self._targets.actors.clear(viewport=self._seen)
         self._context.enable_direct(CLIP_DISTANCE0)
         for actor in self._actors:
             actor.draw()
         self._context.disable_direct(CLIP_DISTANCE0)
+        self._targets.resolved.scissor = self._seen
+        self._targets.resolved.use()
         self._context.copy_framebuffer(self._targets.resolved, self._targets.actors)
 
     def _draw_house(self, camera: Camera, pools: NDArray[np.float64]) -> None:
@@ -197,8 +201,10 @@ class Stage:
         self._context.enable_only(moderngl.BLEND)
         self._context.blend_func = OVER
         self._targets.resolved_image.use(0)
-        self._lay_array.render(moderngl.TRIANGLES, vertices=3)
         width, height = self.size
+        picture.scissor = self._seen
+        self._lay_array.render(moderngl.TRIANGLES, vertices=3)
+        picture.scissor = (0, 0, width, height)
         to_clip = camera.projection(self.aspect) @ camera.view
         pixels = height / (2.0 * np.tan(camera.fov / 2.0))
         for actor in self._actors:
@@ -236,25 +242,11 @@ class Stage:
         """Free everything on the GPU; the stage cannot be used after."""
         for actor in list(self._actors):
             self.remove(actor)
-        for thing in (
-            self._targets,
-            self._maps,
-            self._floor,
-            self._tubes,
-            self._inset,
-            self._caption,
-            self._backdrop_array,
-            self._backdrop_program,
-            self._lay_array,
-            self._lay_program,
-            self._frame,
-            self._mirrored,
-            self._programs.depth,
-            self._programs.plain,
-            self._programs.textured,
-            self._programs.mirror,
-        ):
-            thing.release()
+        release_all(self._targets, self._maps, self._floor, self._tubes, self._inset)
+        release_all(self._caption, self._backdrop_array, self._backdrop_program)
+        release_all(self._lay_array, self._lay_program, self._frame, self._mirrored)
+        programs = self._programs
+        release_all(programs.depth, programs.plain, programs.textured, programs.mirror)
 
 
 _EMPTY = np.array([[[-0.5, 0.0, -0.5], [0.5, 1.5, 0.5]]])

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import moderngl
 
+from runtime.render.programs import release_all
+
 
 class Targets:
     """Framebuffers of one size.
@@ -36,8 +38,4 @@ class Targets:
     def release(self) -> None:
         """Free the framebuffers and all that is attached to them."""
         for target in (self.actors, self.resolved, self.backdrop, self.reflection, self.picture):
-            attached = [*target.color_attachments, target.depth_attachment]
-            target.release()
-            for thing in attached:
-                if thing is not None:
-                    thing.release()
+            release_all(target, *target.color_attachments, target.depth_attachment)

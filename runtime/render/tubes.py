@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from runtime.render.programs import link
+from runtime.render.programs import link, release_all
 
 Tubes = NDArray[np.float32]  # (K, 13): from xyz r, to xyz r, linear rgb and opacity, glow
 
@@ -111,7 +111,7 @@ class TubePainter:
         else:
             self._buffer.orphan()
         self._buffer.write(np.ascontiguousarray(capsules, dtype=np.float32))
-        self._program["to_clip"].write(to_clip.T.astype("f4").tobytes())
+        self._program["to_clip"] = tuple(to_clip.T.ravel())
         self._program["offset"] = tuple(np.asarray(offset, dtype=np.float64))
         self._program["size"] = size
         self._program["origin"] = origin
@@ -121,5 +121,4 @@ class TubePainter:
 
     def release(self) -> None:
         """Free its GL objects."""
-        for thing in (self._array, self._buffer, self._program):
-            thing.release()
+        release_all(self._array, self._buffer, self._program)

@@ -50,24 +50,25 @@ float beams(vec3 from, vec3 along, float until) {
         float height = max(dot(along * ray - foot, key.xyz), 0.0);
         float miss = length(along * ray - foot - key.xyz * height);
         float radius = pools[i].z * mix(0.85, 0.25, clamp(height / 7.0, 0.0, 1.0));
-        sum += exp(-2.5 * miss * miss / (radius * radius)) * exp(-0.10 * height);
+        sum += exp(-3.5 * miss * miss / (radius * radius)) * exp(-0.10 * height);
     }
     return sum;
 }
 
 vec3 curtain(vec3 at) {
     float around = atan(at.x - stage.x, -(at.z - stage.y)) * stage.z;
-    float stripe = fract(around / 2.4 + 0.5) * 3.0;
-    float folds = sin(around * 8.4 + 0.8 * sin(around * 1.7)) * 0.5 + 0.5;
-    folds = mix(folds, sin(around * 21.0 + 2.0 * sin(around * 2.9)) * 0.5 + 0.5, 0.25);
+    around += 0.03 * sin(at.y * 1.3 + around * 2.0);
+    float stripe = fract(around / 1.8 + 0.5) * 3.0;
+    float folds = sin(around * 17.0 + 1.3 * sin(around * 2.3)) * 0.5 + 0.5;
+    folds = mix(folds, sin(around * 41.0 + 2.0 * sin(around * 5.9)) * 0.5 + 0.5, 0.22);
     vec3 black = vec3(0.020, 0.019, 0.026), persimmon = vec3(0.34, 0.095, 0.035);
     vec3 moss = vec3(0.060, 0.135, 0.075);
     vec3 cloth = mix(mix(black, persimmon, smoothstep(0.96, 1.04, stripe)), moss,
                      smoothstep(1.96, 2.04, stripe));
     cloth = mix(cloth, black, smoothstep(2.96, 3.0, stripe));
-    float reach = exp(-0.55 * max(at.y, 0.0)) * 0.30 + 0.035;
+    float reach = exp(-0.60 * max(at.y, 0.0)) * 0.26 + 0.030;
     float sides = exp(-0.10 * pow(at.x - stage.x, 2.0) / max(stage.z, 1.0));
-    return cloth * (0.25 + 0.75 * folds * folds) * reach * sides;
+    return cloth * (0.16 + 1.05 * folds * folds) * reach * sides;
 }
 
 void main() {
@@ -95,7 +96,7 @@ void main() {
     } else {
         light_out = curtain(at);
     }
-    light_out += vec3(0.050, 0.038, 0.026) * beams(from, along, until);
+    light_out += vec3(0.026, 0.020, 0.014) * beams(from, along, until);
 
     vec2 centred = place * 2.0 - 1.0;
     light_out *= 1.0 - 0.42 * smoothstep(0.35, 1.6, dot(centred, centred));

@@ -13,18 +13,17 @@ in vec2 uv;
 #endif
 layout(location = 0) out vec4 picture_colour;
 
-const vec3 KEY = vec3(1.0, 0.87, 0.70) * 2.35;
-const vec3 RIM = vec3(0.50, 0.68, 1.0) * 1.5;
-const vec3 SKY = vec3(0.20, 0.22, 0.32);
-const vec3 BOUNCE = vec3(0.36, 0.22, 0.13);
+const vec3 KEY = vec3(1.0, 0.88, 0.72) * 1.42;
+const vec3 RIM = vec3(0.36, 0.58, 1.0) * 1.7;
+const vec3 SKY = vec3(0.090, 0.100, 0.160);
+const vec3 BOUNCE = vec3(0.150, 0.085, 0.045);
 const vec3 RIM_LEFT = vec3(-0.72, 0.36, -0.60);
 const vec3 RIM_RIGHT = vec3(0.74, 0.30, -0.60);
 
 float lit(vec3 n) {
     vec3 at = (light * vec4(world + n * shadow_texel, 1.0)).xyz;
-    vec2 s = vec2(0.75 / 1024.0, 0.0);
-    return 0.25 * (texture(shadow_map, at + s.xyy) + texture(shadow_map, at - s.xyy)
-                 + texture(shadow_map, at + s.yxy) + texture(shadow_map, at - s.yxy));
+    vec3 s = vec3(0.6, 0.6, 0.0) / 1024.0;
+    return 0.5 * (texture(shadow_map, at + s) + texture(shadow_map, at - s));
 }
 
 void main() {
@@ -39,8 +38,8 @@ void main() {
     // The terminator is soft and warm, as light that has gone a little way into the paint.
     float facing = dot(n, key.xyz);
     float shadow = facing > -0.25 ? lit(n) : 0.0;
-    vec3 soft = clamp((facing + vec3(0.22, 0.10, 0.06)) / vec3(1.22, 1.10, 1.06), 0.0, 1.0);
-    vec3 diffuse = KEY * soft * mix(vec3(0.06, 0.03, 0.04), vec3(1.0), shadow);
+    vec3 soft = clamp((facing + vec3(0.16, 0.06, 0.03)) / vec3(1.16, 1.06, 1.03), 0.0, 1.0);
+    vec3 diffuse = KEY * soft * mix(vec3(0.05, 0.03, 0.05), vec3(1.0), shadow);
 
     float up = n.y * 0.5 + 0.5;
     float near_floor = clamp(world.y * 1.6, 0.0, 1.0);
@@ -48,14 +47,14 @@ void main() {
     ambient *= mix(0.35, 1.0, clamp(world.y * 5.0 + up * 0.5, 0.0, 1.0));
 
     float grazing = 1.0 - clamp(dot(n, to_eye), 0.0, 1.0);
-    float edge = grazing * grazing * grazing;
-    vec2 behind = clamp(vec2(dot(n, RIM_LEFT), dot(n, RIM_RIGHT)) + 0.1, 0.0, 1.0);
-    vec3 rim = RIM * (behind.x * 0.8 + behind.y) * (0.14 + edge);
+    float edge = grazing * grazing;
+    vec2 behind = clamp(vec2(dot(n, RIM_LEFT), dot(n, RIM_RIGHT)) + 0.22, 0.0, 1.0);
+    vec3 rim = RIM * (behind.x * 0.6 + behind.y) * (0.10 + 1.1 * edge);
 
     float gloss = clamp(dot(n, normalize(key.xyz + to_eye)), 0.0, 1.0);
     gloss *= gloss; gloss *= gloss; gloss *= gloss; gloss *= gloss; gloss *= gloss;
-    vec3 lacquer = KEY * gloss * 0.13 * shadow;
+    vec3 lacquer = KEY * gloss * 0.20 * shadow;
 
-    vec3 light_out = base.rgb * (diffuse + ambient) + rim * (0.35 * base.rgb + 0.22) + lacquer;
+    vec3 light_out = base.rgb * (diffuse + ambient) + rim * (0.45 * base.rgb + 0.17) + lacquer;
     picture_colour = vec4(encode(tone(light_out)), base.a);
 }

@@ -1,10 +1,9 @@
 // Linear light to the screen.
 
-// Khronos PBR Neutral: keeps clear colours clear, rolls highlights off towards white.
+// The shoulder of Khronos PBR Neutral without its toe: clear colours stay clear, darks stay soft,
+// highlights roll off towards white.
 vec3 tone(vec3 light) {
-    const float start = 0.76, desaturation = 0.15;
-    float least = min(light.r, min(light.g, light.b));
-    light -= least < 0.08 ? least - 6.25 * least * least : 0.04;
+    const float start = 0.62, desaturation = 0.18;
     float peak = max(light.r, max(light.g, light.b));
     if (peak < start) return light;
     float span = 1.0 - start;

@@ -1,5 +1,6 @@
 // What the polished floor gives back: plain shading that fades with height.
 #include "frame.glsl"
+#include "colour.glsl"
 uniform vec4 tint;
 in vec3 world;
 in vec3 normal;
@@ -10,5 +11,5 @@ void main() {
     if (gl_FrontFacing != (eye.w > 0.0)) n = -n;
     float light_in = 0.16 + 0.75 * clamp(dot(n, key.xyz), 0.0, 1.0);
     float fade = exp(-2.2 * max(world.y, 0.0));
-    picture_colour = vec4(colour.rgb * tint.rgb * light_in, 1.0) * fade;
+    picture_colour = vec4(encode(tone(colour.rgb * tint.rgb * light_in)), 1.0) * fade;
 }
