@@ -7,6 +7,8 @@ a little away from it, metres, +Y up, facing +Z, left on +X.
 
 from __future__ import annotations
 
+import numpy as np
+
 from devices.skeleton import Skeleton
 
 # Of each joint: its name, its parent, and where it stands at rest.
@@ -108,3 +110,11 @@ def _skeleton(joints: _Joints) -> Skeleton:
 KINECT_V1 = _skeleton(_V1)
 KINECT_V2 = _skeleton(_V2)
 KINECT_AZURE = _skeleton(_AZURE)
+
+# Camera axes to ours, the performer facing the sensor: Kinect v1 and v2 have +X to the sensor's
+# left, +Y up and +Z away from it (half a turn about Y); Azure has +Y down (half a turn about X).
+KINECT_TO_WORLD = np.diag([-1.0, 1.0, -1.0])
+AZURE_TO_WORLD = np.diag([1.0, -1.0, -1.0])
+
+# Kinect SDK 2.0 TrackingState, also JointTrackingState of 1.8: not tracked, inferred, tracked.
+CONFIDENCE_OF_STATE = np.array([0.0, 0.5, 1.0])

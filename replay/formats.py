@@ -7,6 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from devices.errors import InputError
+from replay.bvh import read_bvh, recognises_bvh
+from replay.kinect_azure_csv import read_azure_csv, recognises_azure_csv
+from replay.kinect_laban import read_laban, recognises_laban
+from replay.kinect_msr import read_msr, recognises_msr
+from replay.kinect_ntu import read_ntu, recognises_ntu
+from replay.kinect_ut import read_ut, recognises_ut
 from replay.leap_files import is_leap, read_leap
 from replay.mcap_file import is_mcap, read_mcap
 from replay.recording import Recording
@@ -34,6 +40,12 @@ def formats() -> tuple[Format, ...]:
     return (
         Format("Bunraku recording (MCAP)", is_mcap, read_mcap),
         Format("Leap Motion messages", is_leap, read_leap),
+        Format("Azure Kinect joints (CSV)", recognises_azure_csv, read_azure_csv),
+        Format("Kinect v2, Labanotation Suite (CSV)", recognises_laban, read_laban),
+        Format("Kinect v2, NTU RGB+D (.skeleton)", recognises_ntu, read_ntu),
+        Format("Kinect v1, UTKinect-Action3D", recognises_ut, read_ut),
+        Format("Kinect v1, MSR Action3D", recognises_msr, read_msr),
+        Format("BVH", recognises_bvh, read_bvh),
     )
 
 
