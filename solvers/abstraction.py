@@ -30,10 +30,13 @@ Array = NDArray[np.float64]
 BODY_PLAN: Final = 0.25
 # A side chain shorter than this share of the whole is a spur of the extraction or a twist joint.
 SPUR: Final = 0.1
-# Unfolding opens inner sub-trees from the largest down, each step 0.7 as large as the one before.
-_LADDER: Final = tuple(0.7**step for step in range(1, 8))
-# The sub-tree as section 4.1 folds it: nothing inside is opened.
-_FOLDED: Final = float("inf")
+# Where the second limb of a fork is shorter than this share of the first, the first goes on through
+# it: a wing past its feathers, an arm past a twist joint.
+_SIDE: Final = 0.4
+# Unfolding opens inner sub-trees from the largest down to this share of the whole, those together
+# that are as large as one another up to this factor: both hands, not first one and then the other.
+_SMALLEST: Final = 0.08
+_ALIKE: Final = 0.97
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -211,14 +214,23 @@ class Folding:
         position, length = self._collapse(chain)
         return Branch(chain, self._longest(chain[-1]), position, length)
 
-    def walk(self, fork: int, child: int, shortest: float = 0.0) -> tuple[int, ...]:
-        """Nodes from `fork` over `child` to the next leaf or fork, past spurs under `shortest`."""
+    def walk(self, fork: int, child: int) -> tuple[int, ...]:
+        """Nodes from `fork` over `child` to the next leaf or branch node (step 1)."""
+        chain = [fork, child]
+        while len(ahead := self.tree.children[chain[-1]]) == 1:
+            chain.append(ahead[0])
+        return tuple(chain)
+
+    def walk_limb(self, fork: int, child: int, shortest: float) -> tuple[int, ...]:
+        """Nodes from `fork` over `child` to where the limb ends or splits, past side chains."""
         chain = [fork, child]
         while ahead := self.tree.children[chain[-1]]:
-            limbs = ahead if len(ahead) == 1 else self.limbs(chain[-1], shortest)
-            if len(limbs) != 1:
+            if len(ahead) > 1:
+                ahead = self.limbs(chain[-1], shortest)
+            reach = sorted((self.reach[limb] for limb in ahead), reverse=True)
+            if not reach or (len(reach) > 1 and reach[1] >= _SIDE * reach[0]):
                 break
-            chain.append(limbs[0])
+            chain.append(max(ahead, key=lambda limb: self.reach[limb]))
         return tuple(chain)
 
     def limbs(self, node: int, shortest: float) -> tuple[int, ...]:
@@ -245,27 +257,32 @@ class Folding:
         return tuple(path)
 
 
+def fold(folding: Folding, top: int, excluded: int | None = None) -> tuple[Branch, ...]:
+    """The branches of the sub-tree at `top`, without the child `excluded` (step 3)."""
+    children = (child for child in folding.tree.children[top] if child != excluded)
+    return tuple(folding.branch(folding.walk(top, child)) for child in children)
+
+
 def unfold(
-    folding: Folding, top: int, *, opening: float, spur: float, excluded: int | None = None
+    folding: Folding, top: int, opening: float, excluded: int | None = None
 ) -> tuple[tuple[Branch, ...], tuple[int, ...]]:
-    """Branches seen from `top` with inner sub-trees opened; the forks they hang on, `top` first.
+    """The limbs of the sub-tree at `top` with inner sub-trees opened, and the forks they hang on.
 
     Args:
         folding: of a rooted tree.
-        top: the root of the sub-tree.
+        top: the root of the sub-tree; comes first among the forks.
         opening: inner sub-trees are opened that reach at least this share of the whole one.
-        spur: side chains under this share of it are passed over.
         excluded: a child of `top` that does not belong to the sub-tree.
     """
     tree = folding.tree
-    shortest = spur * tree.heights[top]
+    shortest = SPUR * tree.heights[top]
     branches: list[Branch] = []
     forks = [top]
     for fork in forks:
         for child in folding.limbs(fork, shortest):
             if fork == top and child == excluded:
                 continue
-            chain = folding.walk(fork, child, shortest)
+            chain = folding.walk_limb(fork, child, shortest)
             end = chain[-1]
             large = tree.heights[end] >= opening * tree.heights[top]
             if large and len(folding.limbs(end, shortest)) > 1:
@@ -282,16 +299,24 @@ def _unfoldings(folding: Folding, top: int, level: int, excluded: int | None) ->
     while tree.parents[stem[-1]] >= 0 and (len(stem) == 1 or len(tree.children[stem[-1]]) == 1):
         stem.append(int(tree.parents[stem[-1]]))
     stem = stem[::-1] if len(stem) > 1 else []
-    branches, _ = unfold(folding, top, opening=_FOLDED, spur=0.0, excluded=excluded)
-    found = [SubTree(top, top, level, branches, tuple(stem))]
-    for opening in _LADDER:
-        branches, forks = unfold(folding, top, opening=opening, spur=SPUR, excluded=excluded)
+    found = [SubTree(top, top, level, fold(folding, top, excluded), tuple(stem))]
+    for opening in _openings(folding, top, excluded):
+        branches, forks = unfold(folding, top, opening, excluded)
         if {b.chain for b in branches} <= {b.chain for b in found[-1].branches}:
             continue
         centre = _centre(tree, forks, np.array([b.position for b in branches]), branches)
         coarser, plan = len(found[-1].branches), opening >= BODY_PLAN
         found.append(SubTree(top, centre, level, branches, tuple(stem), len(found), coarser, plan))
     return found
+
+
+def _openings(folding: Folding, top: int, excluded: int | None) -> list[float]:
+    """Shares of the whole at which one more group of inner sub-trees opens, descending."""
+    heights = folding.tree.heights
+    _, forks = unfold(folding, top, _SMALLEST, excluded)
+    shares = sorted((heights[fork] / max(heights[top], 1e-300) for fork in forks[1:]), reverse=True)
+    following = [*shares[1:], 0.0]
+    return [here for here, after in zip(shares, following, strict=False) if after < _ALIKE * here]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -334,9 +359,9 @@ def simplify(tree: Tree) -> SimplifiedSource:
     shortest = SPUR * tree.heights[tree.root]
     stem: tuple[int, ...] = (tree.root,)
     if len(first := folding.limbs(tree.root, shortest)) == 1:
-        stem = folding.walk(tree.root, first[0], shortest)
+        stem = folding.walk_limb(tree.root, first[0], shortest)
     top = stem[-1] if len(folding.limbs(stem[-1], shortest)) > 1 else tree.root
-    branches, forks = unfold(folding, top, opening=BODY_PLAN, spur=SPUR)
+    branches, forks = unfold(folding, top, BODY_PLAN)
     weights = np.array([branch.position for branch in branches]).reshape(-1, len(tree))
     centre = _centre(tree, forks, weights @ tree.positions, branches)
     vectors = weights @ tree.positions - tree.positions[centre]

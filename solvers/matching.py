@@ -38,7 +38,7 @@ Chain = tuple[int, ...]
 # A match's pairs, limbs, stops, root and level.
 _Plan = tuple[tuple[tuple[Chain, Chain], ...], int, tuple[int, ...], int, int]
 
-SIZE_PREFERENCE: Final = 0.25  # what suits a live show: a quarter of a perfect pair for full size
+SIZE_PREFERENCE: Final = 0.4  # suits a live show: this much of a perfect pair for full size
 _FADE: Final = 0.05  # of the longest branch
 _REMEMBERED: Final = 4096  # matches whose chains are kept ready
 
