@@ -8,16 +8,18 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from devices.anatomy import hips_joint
+from devices.anatomy import hips_joint, label_joints
 from devices.errors import InputError
 from devices.skeleton import Skeleton
-from replay.orientation import floor_and_start, yaw_to_front
+from replay.orientation import floor_and_start, standing_axis, upright, yaw_to_front
 from replay.recording import Recording
 
 Array = NDArray[np.float64]
 
 MOST_BYTES = 128 * 2**20
 KINECT_RATE = 30.0  # [Hz] of every Kinect's skeleton stream
+_STEEPEST = np.cos(np.radians(40))  # a camera tilted by more is no camera on a stand
+_STRAY = 0.02  # of all frames, whose lowest joint may be tracked below the floor
 _FURTHEST = 100.0  # [m] no Kinect sees so far
 
 
@@ -92,7 +94,8 @@ def rising(path: Path, times: Array, notes: list[str]) -> Array:
     held: Array = np.maximum.accumulate(times)
     if (held != times).any():
         notes.append(f"the clock runs back at {np.count_nonzero(held != times)} frames, held there")
-    return held - held[0]
+    since_start: Array = held - held[0]
+    return since_start
 
 
 def camera_recording(
@@ -109,9 +112,9 @@ def camera_recording(
 ) -> Recording:
     """A recording from what a depth camera saw.
 
-    The camera's up is taken for the world's, since none of the files holds a floor plane. The first
-    performer is turned to face +Z at the start and put above the origin; the lowest joint of the
-    whole recording comes to y = 0.
+    None of the files holds a floor plane, and cameras look down: the recording is levelled by how
+    the performer stands. The first performer is turned to face +Z at the start and put above the
+    origin; the floor, y = 0, is where the feet stand.
 
     Args:
         path: the file, for messages.
@@ -134,22 +137,35 @@ def camera_recording(
         raise InputError(f"{path}: no joint is seen in any frame")
     world = np.where(seen[..., None], positions, np.nan) @ camera_to_world.T
     performers = np.zeros(len(times), dtype=np.int64) if performers is None else performers
-    yaw = yaw_to_front(skeleton, world[performers == 0])
-    yaw = np.eye(3) if yaw is None else yaw
-    degrees = float(np.degrees(np.arctan2(yaw[0, 2], yaw[0, 0])))
-    notes.append(f"turned by {degrees:.0f} degrees to face the front, from the camera's view")
-    world = world @ yaw.T
-    world -= floor_and_start(world, hips_joint(skeleton))
+    turn = _to_front(skeleton, world[performers == 0], notes)
+    world = world @ turn.T
+    world -= floor_and_start(world, hips_joint(skeleton), stray=_STRAY)
     return Recording(
         skeleton=skeleton,
         times=times,
         positions=world,
-        rotations=None if rotations is None else _turned(rotations, yaw @ camera_to_world),
+        rotations=None if rotations is None else _turned(rotations, turn @ camera_to_world),
         confidence=np.where(seen, np.clip(confidence, 0.0, 1.0), 0.0),
         performers=performers,
         arrivals=np.full(len(times), np.nan),
         notes=tuple(notes),
     )
+
+
+def _to_front(skeleton: Skeleton, world: Array, notes: list[str]) -> Array:
+    """The rotation (3, 3) that levels what was seen and turns the performer to the front."""
+    level = np.eye(3)
+    axis = standing_axis(skeleton, label_joints(skeleton), world)
+    if axis is not None and axis[1] > _STEEPEST:
+        level = upright(axis)
+        tilt = float(np.degrees(np.arccos(min(axis[1], 1.0))))
+        notes.append(f"levelled by {tilt:.0f} degrees, as the performer stands")
+    yaw = yaw_to_front(skeleton, world @ level.T)
+    if yaw is None:
+        return level
+    degrees = float(np.degrees(np.arctan2(yaw[0, 2], yaw[0, 0])))
+    notes.append(f"turned by {degrees:.0f} degrees from the camera's view to face the front")
+    return yaw @ level
 
 
 def _turned(rotations: Array, turn: Array) -> Array:

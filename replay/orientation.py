@@ -17,6 +17,8 @@ _MOST_SAMPLES = 200  # frames that a statistic of the whole recording looks at
 _REST_WEIGHT = 0.2  # of the rest pose beside the motion, for whoever lies down all the time
 _SPINE_WEIGHT = 0.5  # of the spine beside the legs: an elephant's lies level
 _LEAST_TURN = 0.2  # of the joints' distance that must be left, seen from above, to tell a heading
+_STRAIGHT = 0.96  # of the bones' lengths from ankle to head that the straight distance must be
+_LEAST_STANDING = 0.1  # of all frames
 _LEG_AND_SPINE = 0.87  # of a body's height: hip to ankle and pelvis to head, along the bones
 
 
@@ -75,6 +77,36 @@ def legs_hang(skeleton: Skeleton, parts: Sequence[Part | None], pose: Array, up:
     return True
 
 
+def standing_axis(
+    skeleton: Skeleton, parts: Sequence[Part | None], positions: Array
+) -> Array | None:
+    """The direction (3,) in which the body stands, feet to head, in frames where it is straight.
+
+    A camera that looks down sees everybody lean; the median over the frames in which legs and back
+    are stretched is the vertical. None where there are too few of them to say.
+
+    Args:
+        skeleton: of `positions`.
+        parts: its labels.
+        positions: (T, J, 3); NaN where not seen.
+    """
+    head, hips = _head(skeleton, parts), _place(skeleton, parts, Kind.HIPS)
+    knees = [_place(skeleton, parts, Kind.LOWER_LEG, side) for side in _SIDES]
+    feet = [_place(skeleton, parts, Kind.FOOT, side) for side in _SIDES]
+    if head is None or hips is None or None in (*knees, *feet):
+        return None
+    straight = np.ones(len(positions), dtype=bool)
+    for leg in zip(feet, knees, strict=True):
+        bones = np.diff(positions[:, np.array([*leg, hips, head])], axis=1)
+        length = np.linalg.norm(bones, axis=2).sum(axis=1)
+        straight &= np.linalg.norm(bones.sum(axis=1), axis=1) > _STRAIGHT * length
+    if np.count_nonzero(straight) < max(1, _LEAST_STANDING * len(positions)):
+        return None
+    between_feet = positions[straight][:, np.array(feet)].mean(axis=1)
+    axis: Array = np.median(positions[straight, head] - between_feet, axis=0)
+    return axis / np.linalg.norm(axis) if axis.any() else None
+
+
 def body_height(skeleton: Skeleton, parts: Sequence[Part | None], rest: Array) -> float | None:
     """How tall a person with these bones is, from the lengths of leg and spine; pose-free.
 
@@ -100,6 +132,19 @@ def up_to_y(up: Array) -> Array:
         return np.diag([1.0, up[1], up[1]])  # half a turn about X when the body hangs from -Y
     turn = np.cross(up, y)
     return np.outer(turn, turn) + np.outer(y, up) - np.outer(up, y)
+
+
+def upright(axis: Array) -> Array:
+    """The smallest rotation (3, 3) that carries the unit vector `axis`, not -Y, to +Y."""
+    x, y, z = axis
+    # Rodrigues' formula about axis x Y, written out; 1 + y > 0 as the axis does not point down.
+    return np.array(
+        [
+            [1 - x * x / (1 + y), -x, -x * z / (1 + y)],
+            [x, y, z],
+            [-x * z / (1 + y), -z, 1 - z * z / (1 + y)],
+        ]
+    )
 
 
 def yaw_to_front(skeleton: Skeleton, positions: Array) -> Array | None:
@@ -129,13 +174,19 @@ def yaw_to_front(skeleton: Skeleton, positions: Array) -> Array | None:
     return None
 
 
-def floor_and_start(positions: Array, hips: int) -> Array:
-    """What to subtract (3,): the lowest joint comes to y = 0, the hips' start to x = z = 0."""
+def floor_and_start(positions: Array, hips: int, stray: float = 0.0) -> Array:
+    """What to subtract (3,): the lowest joint comes to y = 0, the hips' start to x = z = 0.
+
+    Args:
+        positions: (T, J, 3); NaN where not seen.
+        hips: the joint that starts above the origin.
+        stray: share of the frames whose lowest joint may lie below the floor, by bad tracking.
+    """
     seen = positions[np.isfinite(positions[:, hips]).all(axis=1), hips]
-    low = positions[..., 1]
+    low = np.where(np.isfinite(positions[..., 1]), positions[..., 1], np.inf).min(axis=1)
     low = low[np.isfinite(low)]
     x, z = (seen[0, 0], seen[0, 2]) if len(seen) else (0.0, 0.0)
-    return np.array([x, low.min() if low.size else 0.0, z])
+    return np.array([x, np.quantile(low, stray) if low.size else 0.0, z])
 
 
 def _sampled(positions: Array) -> Array:
