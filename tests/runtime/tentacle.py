@@ -47,7 +47,11 @@ def make_tentacle() -> Character:
     shuffled = np.random.default_rng(5).permutation(count + RINGS)
     vertex = np.concatenate([np.arange(count), grid[:, 0]])[shuffled]
     place = np.argsort(shuffled)  # (M,) file index of each unshuffled vertex
-    split = place[faces]
+    across = np.zeros(faces.shape, bool)  # corners beyond the seam: of the last side of each ring
+    sides = np.tile(np.arange(SIDES) == SIDES - 1, RINGS - 1)
+    across[: len(sides)] = across[len(sides) : 2 * len(sides)] = sides[:, None]
+    across &= (faces % SIDES == 0) & (faces < RINGS * SIDES)
+    split = place[np.where(across, count + faces // SIDES, faces)]
     colors = np.ones((len(vertex), 4), np.float32)
     colors[:, 0] = vertices[vertex, 1] / HEIGHT
     placement = np.eye(4)

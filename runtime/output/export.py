@@ -1,0 +1,28 @@
+"""Which exporter writes a performed character to which file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from runtime.character import Character
+from runtime.output.bvh_export import BvhExport
+from runtime.output.gltf_export import GltfExport
+from runtime.output.output import Output
+from runtime.output.usd_export import UsdExport
+from runtime.output.whole_file import check_suffix
+
+
+def open_export(path: Path, character: Character, *, rate: float = 30.0) -> Output:
+    """The export that the suffix of `path` asks for: .glb, .usda, .usdc or .bvh.
+
+    `rate` is about how many frames a second will come.
+
+    Raises:
+        InputError: another suffix, a missing library, or the file cannot be written.
+    """
+    suffix = check_suffix(path, (".glb", ".usdc", ".usda", ".bvh"))
+    if suffix == ".glb":
+        return GltfExport(path, character)
+    if suffix == ".bvh":
+        return BvhExport(path, character)
+    return UsdExport(path, character, rate=rate)
