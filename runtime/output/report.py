@@ -94,7 +94,7 @@ class Report:
 
     The keys: ``frames``, ``dropped``, ``recording`` {frames, joints, seconds}, ``character``
     {vertices, faces, nodes}, ``match`` {score, pairs: [{source: [joint names], target: [node
-    ids]}]}, ``stages_ms`` {poll, match, retarget, deform, render, frame: {p50, p99, max}},
+    ids]}]}, ``stages_ms`` {poll, match, retarget, deform, render, publish, frame: {p50, p99, max}},
     ``stretch`` {mean, p99}. With several characters ``character``, ``match`` and ``stretch`` are
     those of the first, and ``characters`` lists them for each, with its ``name``. A value that is
     not a finite number is written as null: the file is JSON by the letter of RFC 8259.

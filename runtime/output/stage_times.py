@@ -16,7 +16,7 @@ class StageTimes:
     """Every sample of every stage, as 4 bytes each: an hour at 60 Hz takes 5 MB.
 
     The stages are those of the report: ``poll``, ``match``, ``retarget``, ``deform``, ``render``,
-    and ``frame`` for all of a tick.
+    ``publish`` for the outputs, and ``frame`` for all of a tick.
     """
 
     def __init__(self) -> None:

@@ -1,0 +1,100 @@
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+import pytest
+
+from devices.errors import InputError
+from runtime.output.report import MatchedPair, Report
+from tests.runtime.tentacle import NODES, make_show, make_tentacle
+
+
+def refuse(constant: str) -> NoReturn:
+    raise AssertionError(f"{constant} is not JSON")
+
+
+def test_the_report_has_the_keys_that_others_read(tmp_path: Path) -> None:
+    character = make_tentacle()
+    with Report(tmp_path / "r.json") as report:
+        report.recorded(frames=np.int64(9), joints=25, seconds=np.float32(0.5))
+        part = report.cast(character)
+        part.matched(np.float32(0.75), [MatchedPair(("Hip", "Knee"), tuple(np.arange(3)))])
+        for frame in make_show(character, frames=7):
+            part.write(frame)
+            report.times.add("deform", 0.002)
+        report.dropped += 2
+    written = json.loads((tmp_path / "r.json").read_text(), parse_constant=refuse)
+    stages = written.pop("stages_ms")
+    assert list(stages) == [*("poll", "match", "retarget", "deform", "render", "publish", "frame")]
+    assert stages["deform"] == pytest.approx({"p50": 2.0, "p99": 2.0, "max": 2.0})
+    assert stages["render"] == {"p50": 0.0, "p99": 0.0, "max": 0.0}
+    stretch = written.pop("stretch")
+    assert 0 < stretch["mean"] < stretch["p99"] < 0.2
+    assert written == {
+        "frames": 7,
+        "dropped": 2,
+        "recording": {"frames": 9, "joints": 25, "seconds": 0.5},
+        "character": {
+            "vertices": len(character.vertices),
+            "faces": len(character.faces),
+            "nodes": NODES,
+        },
+        "match": {"score": 0.75, "pairs": [{"source": ["Hip", "Knee"], "target": [0, 1, 2]}]},
+    }
+
+
+def test_several_characters_are_listed_beside_the_first(tmp_path: Path) -> None:
+    character = make_tentacle()
+    with Report(tmp_path / "r.json") as report:
+        first = report.cast(character)
+        second = report.cast(replace(character, name="other"))
+        second.matched(None, [])
+        for frame in make_show(character, frames=3):
+            first.write(frame)
+            second.write(replace(frame, vertices=character.vertices))
+    written = json.loads((tmp_path / "r.json").read_text())
+    assert [entry["name"] for entry in written["characters"]] == ["tentacle", "other"]
+    assert written["frames"] == 3
+    assert written["stretch"] == written["characters"][0]["stretch"]
+    assert written["characters"][1]["stretch"] == {"mean": 0.0, "p99": 0.0}
+    assert written["characters"][1]["match"] == {"score": None, "pairs": []}
+
+
+def test_numbers_that_json_cannot_hold_become_null(tmp_path: Path) -> None:
+    with Report(tmp_path / "r.json") as report:
+        report.recorded(frames=1, joints=2, seconds=float("nan"))
+        report.cast(make_tentacle()).matched(float("-inf"), [])
+    written = json.loads((tmp_path / "r.json").read_text(), parse_constant=refuse)
+    assert written["recording"]["seconds"] is None
+    assert written["match"]["score"] is None
+
+
+def test_names_of_any_kind_can_be_written(tmp_path: Path) -> None:
+    with Report(tmp_path / "r.json") as report:
+        part = report.cast(make_tentacle())
+        part.matched(1.0, [MatchedPair(('"é\n', "\udc80"), (1,))])
+    pairs = json.loads((tmp_path / "r.json").read_bytes())["match"]["pairs"]
+    assert pairs[0]["source"] == ['"é\n', "\udc80"]
+
+
+def test_a_show_that_never_began_is_reported_too(tmp_path: Path) -> None:
+    Report(tmp_path / "r.json").close()
+    assert json.loads((tmp_path / "r.json").read_text())["frames"] == 0
+
+
+def test_without_a_path_nothing_is_written_but_all_is_counted(tmp_path: Path) -> None:
+    character = make_tentacle()
+    with Report(None) as report:
+        part = report.cast(character)
+        part.write(make_show(character, frames=1)[0])
+    assert report.summary()["frames"] == 1
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_cannot_be_written_is_refused_before_the_show(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="there is no folder"):
+        Report(tmp_path / "missing" / "r.json")
