@@ -15,6 +15,7 @@ from replay.kinect_ntu import read_ntu, recognises_ntu
 from replay.kinect_ut import read_ut, recognises_ut
 from replay.leap_files import is_leap, read_leap
 from replay.mcap_file import is_mcap, read_mcap
+from replay.mediapipe_files import is_mediapipe, read_mediapipe
 from replay.recording import Recording
 
 HEAD_BYTES = 4096
@@ -40,6 +41,7 @@ def formats() -> tuple[Format, ...]:
     return (
         Format("Bunraku recording (MCAP)", is_mcap, read_mcap),
         Format("Leap Motion messages", is_leap, read_leap),
+        Format("MediaPipe landmarks", is_mediapipe, read_mediapipe),
         Format("Azure Kinect joints (CSV)", recognises_azure_csv, read_azure_csv),
         Format("Kinect v2, Labanotation Suite (CSV)", recognises_laban, read_laban),
         Format("Kinect v2, NTU RGB+D (.skeleton)", recognises_ntu, read_ntu),
