@@ -98,8 +98,9 @@ def _settle_limb(parts: list[Part | None], side: Side, skeleton: Skeleton) -> No
         settle(joints("shoulder", "shldr")[-1:], Kind.UPPER_ARM)
     if not has(Kind.UPPER_LEG):
         settle(joints("hip")[-1:], Kind.UPPER_LEG)
-    if not has(Kind.UPPER_LEG) and has(Kind.LOWER_LEG):
-        settle(joints("leg")[:1], Kind.UPPER_LEG)
+    legs = joints("leg")
+    if not has(Kind.UPPER_LEG) and (len(legs) == 2 or joints("knee", "shin", "calf", "lowerleg")):
+        settle(legs[:1], Kind.UPPER_LEG)
     if joints("ankle"):
         settle(joints("foot"), Kind.TOES)
 

@@ -10,11 +10,9 @@ from devices.joint_names import Kind, Part, Side
 from devices.skeleton import Skeleton
 
 _TRUNK = (Kind.HIPS, Kind.SPINE, Kind.CHEST, Kind.NECK, Kind.HEAD)
-_SEVERAL = (Kind.SHOULDER, Kind.HAND)  # a limb may have two: collar and shoulder, wrist and palm
-_ONCE = (
-    *(Kind.UPPER_ARM, Kind.LOWER_ARM),  # more are twist segments
-    *(Kind.UPPER_LEG, Kind.LOWER_LEG, Kind.FOOT, Kind.TOES),
-)
+_ARM = (Kind.UPPER_ARM, Kind.LOWER_ARM)
+_LEG = (Kind.UPPER_LEG, Kind.LOWER_LEG, Kind.FOOT, Kind.TOES)
+_LIMB = (Kind.SHOULDER, Kind.HAND, *_ARM, *_LEG)
 # Parts of the rest pose's size: face bones that reach so far are a trunk or a snout, unnamed ones
 # a wing or a fin; a joint so close to the one above gives its bone no direction.
 _LONG_FACE, _LONG_UNNAMED, _COINCIDENT = 0.2, 0.15, 1e-3
@@ -34,27 +32,44 @@ def trunk_and_limbs(skeleton: Skeleton, parts: Sequence[Part | None]) -> tuple[i
     """
     body = [joint for joint, part in enumerate(parts) if part is None or part.kind is not Kind.ROOT]
     size = max(float(np.ptp(skeleton.rest_positions[body], axis=0).max()), 1e-9)
+    kept = _kept(skeleton, parts, size)
+    kept.update(_hand_ends(skeleton, parts, kept))
+    kept.update(_foot_ends(parts))
+    kept = _apart(skeleton, kept, size)
+    return tuple(joint for joint in skeleton.order if joint in kept)
+
+
+def _kept(skeleton: Skeleton, parts: Sequence[Part | None], size: float) -> set[int]:
+    """The joints that are kept by themselves, before hands and feet are given an end."""
     children: list[list[int]] = [[] for _ in parts]
     for joint in skeleton.order[1:]:
         children[skeleton.parents[joint]].append(joint)
+    there = {(part.kind, part.side) for part in parts if part is not None}
     kept: set[int] = set()
-    taken: set[tuple[Kind, Side]] = set()
+    endings: set[tuple[Kind, int | None]] = set()  # hands and toes, by the joint they hang on
     for joint in skeleton.order:
         part, parent = parts[joint], int(skeleton.parents[joint])
+        hung_on = above(skeleton, joint, kept)
+        upper = None if hung_on is None else parts[hung_on]
         if part is not None and part.kind not in (Kind.FACE, Kind.HELPER):
-            keep = _is_trunk_or_limb(part, parent in kept, (part.kind, part.side) in taken)
+            again = upper is not None and (upper.kind, upper.side) == (part.kind, part.side)
+            keep = (
+                (_is_trunk(part, parent in kept) or _is_limb(part))
+                and not (again and _is_segment(part, there))
+                and (part.kind, hung_on) not in endings
+            )
         elif parent in kept and (part is None or part.kind is Kind.FACE):
             long = (_LONG_UNNAMED if part is None else _LONG_FACE) * size
-            keep = _goes_on(parts, joint, parent) or _reach(skeleton, children, joint) >= long
+            keep = (
+                _goes_on(parts, joint, parent) or _reach(skeleton, parts, children, joint) >= long
+            )
         else:
             keep = False
         if keep:
             kept.add(joint)
-            taken.update(() if part is None else ((part.kind, part.side),))
-    kept.update(_hand_ends(skeleton, parts, kept))
-    kept.update(_foot_ends(parts, taken))
-    kept = _apart(skeleton, kept, size)
-    return tuple(joint for joint in skeleton.order if joint in kept)
+        if keep and part is not None and part.kind in (Kind.HAND, Kind.TOES):
+            endings.add((part.kind, hung_on))
+    return kept
 
 
 def above(skeleton: Skeleton, joint: int, chosen: set[int]) -> int | None:
@@ -65,26 +80,45 @@ def above(skeleton: Skeleton, joint: int, chosen: set[int]) -> int | None:
     return None if parent < 0 else parent
 
 
-def _reach(skeleton: Skeleton, children: list[list[int]], joint: int) -> float:
-    """How far the branch that begins at `joint` gets from where it hangs [m], at rest."""
+def _reach(
+    skeleton: Skeleton, parts: Sequence[Part | None], children: list[list[int]], joint: int
+) -> float:
+    """How far the branch that begins at `joint` gets from where it hangs [m], at rest.
+
+    Tips do not count: some exporters put end sites half a metre off.
+    """
     branch = [joint]
     for member in branch:
         branch.extend(children[member])
     rest = skeleton.rest_positions
-    hung_at = rest[skeleton.parents[joint]]
-    return float(np.linalg.norm(rest[branch] - hung_at, axis=1).max())
+    moving = [member for member in branch if not ((part := parts[member]) and part.tip)]
+    reach = np.linalg.norm(rest[moving] - rest[skeleton.parents[joint]], axis=1)
+    return float(reach.max(initial=0.0))
 
 
-def _is_trunk_or_limb(part: Part, hangs: bool, taken: bool) -> bool:
-    """`hangs`: the joint above is kept; `taken`: this part already has its joint."""
+def _is_trunk(part: Part, hangs: bool) -> bool:
+    """Whether a part belongs to trunk or tail; `hangs`: the joint above is kept."""
     if part.kind is Kind.TAIL:
         return True
-    central = part.side is Side.CENTRE
-    if part.kind is Kind.HEAD and part.tip:
-        return hangs and central
-    if part.kind in _TRUNK:
-        return central and not part.tip
-    return not part.tip and (part.kind in _SEVERAL or (part.kind in _ONCE and not taken))
+    if part.side is not Side.CENTRE or part.kind not in _TRUNK:
+        return False
+    return not part.tip or (part.kind is Kind.HEAD and hangs)
+
+
+def _is_limb(part: Part) -> bool:
+    return part.kind in _LIMB and not part.tip
+
+
+def _is_segment(part: Part, there: set[tuple[Kind, Side]]) -> bool:
+    """Whether a second joint of the same part of a limb only divides its bone, to twist it.
+
+    So it is where names tell thigh from shin; where a spider's leg has seven joints all called leg,
+    each bends.
+    """
+    for whole_limb in (_ARM, _LEG):
+        if part.kind in whole_limb:
+            return all((kind, part.side) in there for kind in whole_limb[:2])
+    return False
 
 
 def _goes_on(parts: Sequence[Part | None], joint: int, parent: int) -> bool:
@@ -124,11 +158,11 @@ def _points_on(skeleton: Skeleton, wrist: int, end: int) -> bool:
     return least < float(np.linalg.norm(hand)) < most and float(hand @ forearm) > 0
 
 
-def _foot_ends(parts: Sequence[Part | None], taken: set[tuple[Kind, Side]]) -> Iterable[int]:
+def _foot_ends(parts: Sequence[Part | None]) -> Iterable[int]:
     """Where a foot has no toes: its own end."""
+    toes = {part.side for part in parts if part is not None and part.kind is Kind.TOES}
     for joint, part in enumerate(parts):
-        ends_foot = part is not None and part.kind is Kind.FOOT and part.tip
-        if part is not None and ends_foot and (Kind.TOES, part.side) not in taken:
+        if part is not None and part.kind is Kind.FOOT and part.tip and part.side not in toes:
             yield joint
 
 
