@@ -29,17 +29,17 @@ class StretchStatistic:
         extent = np.ptp(vertices, axis=0).max(initial=0.0) if len(vertices) else 0.0
         kept = lengths > 1e-9 * extent
         self._edges = np.ascontiguousarray(edges[kept])
-        self._lengths = np.ascontiguousarray(lengths[kept])
+        self._inverse_lengths = 1 / lengths[kept]
         self._histogram = np.zeros(_BINS + 1, np.int64)
         self._sum = 0.0
         # Compiles now, or loads what an earlier run compiled, and not within the first frame.
         rest = np.ascontiguousarray(vertices, np.float64)
-        _accumulate(rest, self._edges, self._lengths, np.zeros_like(self._histogram))
+        _accumulate(rest, self._edges, self._inverse_lengths, np.zeros_like(self._histogram))
 
     def add(self, vertices: NDArray[np.float64]) -> None:
         """Count all edges of one deformed surface (N, 3)."""
         positions = np.ascontiguousarray(vertices, np.float64)
-        self._sum += _accumulate(positions, self._edges, self._lengths, self._histogram)
+        self._sum += _accumulate(positions, self._edges, self._inverse_lengths, self._histogram)
 
     @property
     def mean(self) -> float:
@@ -59,20 +59,20 @@ class StretchStatistic:
 def _accumulate(
     positions: NDArray[np.float64],
     edges: NDArray[np.int64],
-    lengths: NDArray[np.float64],
+    inverse_lengths: NDArray[np.float64],
     histogram: NDArray[np.int64],
 ) -> float:
     """Put every edge's stretch into `histogram`, whose last bin is all above; give their sum."""
     last = len(histogram) - 1
-    total = 0.0
+    bins = 0.0
     for edge in range(len(edges)):
-        square = 0.0
-        for axis in range(3):
-            side = positions[edges[edge, 0], axis] - positions[edges[edge, 1], axis]
-            square += side * side
-        stretch = abs(np.sqrt(square) / lengths[edge] - 1.0)
-        if not stretch < last * _BIN:  # also when it is not a number
-            stretch = last * _BIN
-        total += stretch
-        histogram[min(int(stretch / _BIN), last)] += 1
-    return total
+        a, b = edges[edge, 0], edges[edge, 1]
+        x = positions[a, 0] - positions[b, 0]
+        y = positions[a, 1] - positions[b, 1]
+        z = positions[a, 2] - positions[b, 2]
+        stretch = abs(np.sqrt(x * x + y * y + z * z) * inverse_lengths[edge] - 1.0) / _BIN
+        if not stretch < last:  # also when it is not a number
+            stretch = float(last)
+        bins += stretch
+        histogram[int(stretch)] += 1
+    return bins * _BIN

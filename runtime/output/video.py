@@ -21,7 +21,8 @@ _SHORTEST = _TICKS // 1000  # Matroska counts milliseconds: no two frames may fa
 _BT709 = 1  # primaries, transfer and matrix alike; ITU-T H.273, tables 2 to 4
 _LIMITED_RANGE = 1  # luma 16 to 235, as players expect
 _H264 = {
-    "libx264": {"crf": "18", "preset": "veryfast"},
+    # Mode 3 spends more bits where it is dark, as on a puppet stage: no bands in its gradients.
+    "libx264": {"crf": "18", "preset": "veryfast", "aq-mode": "3"},
     "libopenh264": {"b": "8M"},
     "mpeg4": {"qscale": "3", "flags": "+qscale"},
 }
