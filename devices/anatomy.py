@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -116,25 +116,27 @@ def _listed(names: Iterable[str]) -> str:
 
 def _joint_called(skeleton: Skeleton, name: str) -> int:
     """The one joint that `name` stands for; see `source_joints`."""
+    if name in skeleton.names:
+        return skeleton.names.index(name)
     plain = name.lower()
-    names = [known.lower() for known in skeleton.names]
-    bare = [known.replace("|", ":").rsplit(":", 1)[-1].strip() for known in names]
-    tests: tuple[Callable[[int], bool], ...] = (
-        lambda joint: skeleton.names[joint] == name,
-        lambda joint: plain in (names[joint], bare[joint]),
-        lambda joint: names[joint].startswith(plain) or bare[joint].startswith(plain),
-    )
-    for test in tests:
-        found = [joint for joint in range(len(names)) if test(joint)]
-        if len(found) == 1:
-            return found[0]
-        if found:
-            several = _listed(skeleton.names[joint] for joint in found[:8])
-            raise InputError(f"--source {name!r} stands for {len(found)} joints: {several}")
+    full = [known.lower() for known in skeleton.names]
+    bare = [known.replace("|", ":").rsplit(":", 1)[-1].strip() for known in full]
+    found = [joint for joint, names in enumerate(zip(full, bare, strict=True)) if plain in names]
+    if not found and plain not in PRESETS:
+        found = [
+            joint
+            for joint, names in enumerate(zip(full, bare, strict=True))
+            if any(known.startswith(plain) for known in names)
+        ]
+    if len(found) == 1:
+        return found[0]
+    if found:
+        several = _listed(skeleton.names[joint] for joint in found[:8])
+        raise InputError(f"--source {name!r} stands for {len(found)} joints: {several}")
     there = _listed(available_presets(skeleton))
     if plain in PRESETS:
         raise InputError(f"this performer has no {plain!r} to drive with; --source can be: {there}")
-    joints = _listed(skeleton.names[:60]) + (" ..." if len(names) > 60 else "")
+    joints = _listed(skeleton.names[:60]) + (" ..." if len(full) > 60 else "")
     raise InputError(
         f"--source {name!r} is no joint of this performer; presets: {there}; joints: {joints}"
     )

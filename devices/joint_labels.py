@@ -153,16 +153,16 @@ def _label_by_shape(skeleton: Skeleton) -> list[Part | None]:
     if hips is None:
         return parts
     limbs = [_longest_chain(skeleton, child) for child in _branches(skeleton, hips, 0.2 * size)]
-    legs = _pair(limbs, rest, hips)
+    legs = _pair([limb for limb in limbs if rest[limb[-1], 1] < rest[hips, 1]], rest, hips)
     rising = [limb for limb in limbs if rest[limb[-1], 1] > rest[hips, 1] + 0.15 * size]
-    if legs is None or len(rising) != 1 or rising[0] in legs:
+    if legs is None or len(rising) != 1:
         return parts
     chest = _fork(skeleton, rising[0][0], 0.12 * size)
     if chest is None:
         return parts
     limbs = [_longest_chain(skeleton, child) for child in _branches(skeleton, chest, 0.12 * size)]
     arms = _pair(limbs, rest, chest)
-    if arms is None or max(rest[leg[-1], 1] for leg in legs) > rest[hips, 1]:
+    if arms is None:
         return parts
     joint = chest
     while joint != hips:
