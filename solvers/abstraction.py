@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Final
 
 import numpy as np
@@ -314,9 +315,10 @@ def _openings(folding: Folding, top: int, excluded: int | None) -> list[float]:
     """Shares of the whole at which one more group of inner sub-trees opens, descending."""
     heights = folding.tree.heights
     _, forks = unfold(folding, top, _SMALLEST, excluded)
-    shares = sorted((heights[fork] / max(heights[top], 1e-300) for fork in forks[1:]), reverse=True)
-    following = [*shares[1:], 0.0]
-    return [here for here, after in zip(shares, following, strict=False) if after < _ALIKE * here]
+    whole = max(heights[top], 1e-300)
+    shares = sorted((float(heights[fork] / whole) for fork in forks[1:]), reverse=True)
+    last = [here for here, after in pairwise([*shares, 0.0]) if after < _ALIKE * here]
+    return [share * (1.0 - 1e-9) for share in last]  # so that rounding leaves none shut
 
 
 @dataclass(frozen=True, slots=True, eq=False)
