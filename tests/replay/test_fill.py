@@ -115,6 +115,14 @@ def test_what_lies_beyond_a_hundred_metres_was_not_seen() -> None:
         assert filled.filled.tolist() == [True, False, False]
 
 
+def test_a_clock_that_went_back_does_not_hold_for_ever() -> None:
+    filler = Filler(ARM)
+    filler.fill(frame(1000.0, UP))
+    np.testing.assert_allclose(filler.fill(frame(0.0, without(UP, "hand"))).positions, UP)
+    rested = filler.fill(frame(2.0, without(UP, "hand"))).positions[0]
+    np.testing.assert_allclose(rested, [2.0, 2.0, 0.0], atol=1e-12)
+
+
 def test_performers_do_not_share_what_was_seen() -> None:
     filler = Filler(ARM)
     filler.fill(frame(0.0, UP, performer=1))

@@ -213,6 +213,33 @@ def test_tips_without_names_get_fingers_and_keep_them(tmp_path: Path, mirror: fl
     assert np.isfinite(place(recording, 5, "middle_tip")).all()
 
 
+def test_unnamed_hands_keep_their_sides_while_they_cross(tmp_path: Path) -> None:
+    frames = []
+    for index, x in enumerate((80.0, 40.0, -40.0, -80.0)):
+        hands = [hand(4, None, x), hand(2, None, -x)]
+        frames.append(frame(index, hands, tips(4, {1: (x, 90.0)}) + tips(2, {8: (-x, 90.0)})))
+    recording = read_leap(lines(tmp_path / "a.ldj", frames, version=1))
+    right = recording.positions[:, recording.skeleton.index("right_palm"), 0]
+    np.testing.assert_allclose(right, [-0.08, -0.04, 0.04, 0.08])
+
+
+def test_of_two_hands_on_one_side_the_one_there_before_stays_else_the_surer(
+    tmp_path: Path,
+) -> None:
+    ghost, true, left = (
+        hand(1, "right", 10.0, confidence=0.2),
+        hand(2, "right", 50.0, confidence=0.9),
+        hand(3, "left", -50.0),
+    )
+    frames = [
+        frame(0, [ghost, true, left], []),
+        frame(1, [ghost | {"confidence": 1.0}, true, left], []),
+    ]
+    recording = read_leap(document(tmp_path / "a.json", frames))
+    right = recording.positions[:, recording.skeleton.index("right_palm"), 0]
+    np.testing.assert_allclose(right, [-0.05, -0.05])
+
+
 def test_a_tool_is_no_finger(tmp_path: Path) -> None:
     pencil = tips(3, {1: (0.0, 150.0)})[0] | {"tool": True}
     frames = [frame(0, [hand(3, None, 0.0)], [*tips(3, SPREAD), pencil])]
