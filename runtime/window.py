@@ -12,7 +12,7 @@ import moderngl
 
 from devices.errors import InputError
 from runtime.render.camera import Camera, front_camera
-from runtime.render.context import current_context
+from runtime.render.context import current_context, leave_headless
 
 ORBIT_SPEED = 0.006  # rad a pixel
 ZOOM_STEP = 1.12  # a notch of the wheel
@@ -191,6 +191,7 @@ def _open_window(title: str, size: tuple[int, int], visible: bool) -> Any:
     problems: list[str] = []
     report: Any = lambda _code, text: problems.append(text.decode("utf-8", "replace"))  # noqa: E731
     glfw.set_error_callback(report)
+    leave_headless()
     handle = None
     if glfw.init():
         for hint, value in (

@@ -52,7 +52,7 @@ class Actor:
     """A character that stands on a stage; made by `Stage.add`.
 
     Attributes:
-        name: the character's, shown as its caption.
+        caption: what is written at its feet, or nothing.
         position: (3,) [m] where its origin stands on the stage.
     """
 
@@ -62,8 +62,9 @@ class Actor:
         programs: ActorPrograms,
         character: Character,
         position: ArrayLike,
+        caption: str,
     ) -> None:
-        self.name = character.name
+        self.caption = caption
         self.position = np.array(position, dtype=np.float64).reshape(3)
         self._context = context
         self._programs = programs
@@ -131,7 +132,7 @@ class Actor:
             colours: linear RGB of each chain.
         """
         height = float(np.ptp(self.rest_box, axis=0).max())
-        self._tubes = chain_tubes(chains, colours, 0.0095 * height)
+        self._tubes = chain_tubes(chains, colours, 0.012 * height)
 
     @property
     def tubes(self) -> NDArray[np.float32]:
@@ -283,5 +284,4 @@ def _image(context: moderngl.Context, material: Material) -> moderngl.Texture:
     texture = context.texture(picture.size, 4, picture.tobytes(), internal_format=SRGB8_ALPHA8)
     texture.build_mipmaps()
     texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
-    texture.anisotropy = min(4.0, context.max_anisotropy)
     return texture

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 Matrix = NDArray[np.float64]
 
-DEFAULT_PITCH = math.radians(9.0)
+DEFAULT_PITCH = math.radians(8.0)
 HIGHEST_PITCH = math.radians(80.0)
-HEADROOM = 0.3  # how far down, from 0 to 1, actors stand in a picture higher than they need
+HEADROOM = 0.42  # how far down, from 0 to 1, actors stand in a picture higher than they need
 LOWEST_PITCH = math.radians(1.0)  # the eye stays above the floor
 
 
@@ -65,7 +65,7 @@ class Camera:
         matrix[3, 2] = -1.0
         return matrix
 
-    def frame(self, bounds: ArrayLike, aspect: float, *, margin: float = 0.12) -> Camera:
+    def frame(self, bounds: ArrayLike, aspect: float, *, margin: float = 0.1) -> Camera:
         """Move, without turning, to where boxes just fill the picture less its margins.
 
         A point (x, y, z) in the camera's axes lies inside the right edge of slope t, seen from

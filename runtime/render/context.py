@@ -6,12 +6,14 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
+from weakref import WeakSet
 
 import moderngl
 
 from devices.errors import InputError
 
 INSTALL_HINT = "on Debian or Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri"
+_headless: WeakSet[moderngl.Context] = WeakSet()
 EGL_DEVICES = 4  # a machine lists its GPUs first and Mesa's software device last
 
 
@@ -20,6 +22,7 @@ def headless_context(*, libegl: str = "libEGL.so.1", libgl: str = "libGL.so.1") 
 
     Linux asks EGL by the names that a plain Debian has; Windows and macOS use their own hidden
     window. EGL devices that refuse (no permission, no driver) are passed over for the next one.
+    End it with `release_headless`.
 
     Raises:
         InputError: there is no EGL, GL or driver; the message says what to install.
@@ -35,19 +38,36 @@ def headless_context(*, libegl: str = "libEGL.so.1", libgl: str = "libGL.so.1") 
         except Exception as error:  # glcontext raises bare Exception for every failure
             refusals.append(str(error))
         else:
+            _headless.add(context)
             return context
     raise InputError(
         f"headless rendering could not start OpenGL 3.3 through EGL ({refusals[0]}); {INSTALL_HINT}"
     )
 
 
+def leave_headless() -> None:
+    """Make no headless context current: X11 ends a process whose thread then opens a window."""
+    for context in _headless:
+        leave: Callable[..., None] = context.__exit__
+        leave(None, None, None)
+
+
+def release_headless(context: moderngl.Context) -> None:
+    """End a context that `headless_context` made; a plain release would leave it current."""
+    leave_headless()
+    _headless.discard(context)
+    context.release()
+
+
 def _other_platform() -> moderngl.Context:
     try:
-        return moderngl.create_context(standalone=True)
+        context = moderngl.create_context(standalone=True)
     except Exception as error:  # glcontext raises bare Exception for every failure
         raise InputError(
             f"headless rendering could not start OpenGL 3.3 ({error}); update the graphics driver"
         ) from error
+    _headless.add(context)
+    return context
 
 
 class _Loader:

@@ -85,7 +85,7 @@ def _skeleton_tubes(
     known: NDArray[np.bool],
 ) -> Tubes:
     """Bones from parent to child in the child's colour, and beads; far ones first."""
-    driven = np.isfinite(colours).all(axis=1)
+    driven = np.asarray(np.isfinite(colours).all(axis=1), dtype=np.bool)
     colour = np.where(driven[:, None], colours, IDLE)
     opacity = np.where(dimmed, 0.28, 1.0)
     child = np.flatnonzero((parents >= 0) & known & known[parents])

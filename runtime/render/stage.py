@@ -12,7 +12,7 @@ from runtime.render.actor import Actor, ActorPrograms
 from runtime.render.camera import Camera
 from runtime.render.caption import CaptionPainter
 from runtime.render.floor import Floor, ShadowMaps
-from runtime.render.frame import MAX_POOLS, Lighting, covered, frame_block, lighting
+from runtime.render.frame import FRAME, MAX_POOLS, Lighting, covered, frame_block, lighting
 from runtime.render.inset import InsetPainter, SkeletonInset
 from runtime.render.programs import FRAME_BINDING, link, release_all
 from runtime.render.targets import Targets
@@ -48,7 +48,6 @@ class Stage:
         self._samples = min(samples, context.max_samples)
         self._transparent = transparent
         self._actors: list[Actor] = []
-        self._captions: dict[int, str] = {}
         self._programs = ActorPrograms(
             depth=link(context, "depth", "depth"),
             plain=link(context, "character", "character"),
@@ -65,9 +64,8 @@ class Stage:
         self._backdrop_array = context.vertex_array(self._backdrop_program, [])
         self._lay_program = link(context, "whole", "resolved")
         self._lay_array = context.vertex_array(self._lay_program, [])
-        block = frame_block(Camera(), size, lighting(_EMPTY), _NO_POOLS, on_floor=False)
-        self._frame = context.buffer(reserve=block.nbytes, dynamic=True)
-        self._mirrored = context.buffer(reserve=block.nbytes, dynamic=True)
+        self._frame = context.buffer(reserve=FRAME.itemsize, dynamic=True)
+        self._mirrored = context.buffer(reserve=FRAME.itemsize, dynamic=True)
         self._targets = self._make_targets(size)
         self._kept_backdrop = b""
         self._seen = (0, 0, *size)
@@ -115,15 +113,13 @@ class Stage:
         """
         if len(self._actors) == MAX_POOLS:
             raise InputError(f"a stage holds {MAX_POOLS} characters at most")
-        actor = Actor(self._context, self._programs, character, position)
+        actor = Actor(self._context, self._programs, character, position, caption)
         self._actors.append(actor)
-        self._captions[id(actor)] = caption
         return actor
 
     def remove(self, actor: Actor) -> None:
         """Take an actor off the stage and free what it holds."""
         self._actors.remove(actor)
-        del self._captions[id(actor)]
         actor.release()
 
     def resize(self, size: tuple[int, int]) -> None:
@@ -211,15 +207,20 @@ class Stage:
             self._tubes.draw(
                 actor.tubes, to_clip, size=self.size, pixels=pixels, offset=actor.position
             )
-        for actor in self._actors:
-            caption = self._captions[id(actor)]
-            if caption:
-                low, high = actor.rest_box + actor.position
-                foot = to_clip @ [(low[0] + high[0]) / 2.0, 0.0, high[2] + 0.16, 1.0]
-                at = (foot[:2] / foot[3] * 0.5 + 0.5) * [width, height]
-                self._caption.draw(caption, (float(at[0]), float(at[1])), picture)
+        self._draw_captions(to_clip)
         if inset is not None:
             self._inset.draw(inset, self._tubes, picture)
+
+    def _draw_captions(self, to_clip: NDArray[np.float64]) -> None:
+        for actor in self._actors:
+            if actor.caption:
+                depth = max(other.rest_box[1, 2] for other in self._actors)
+                near = actor.position[2] + depth + 0.16
+                foot = to_clip @ [actor.pool[0], 0.0, near, 1.0]
+                at = (foot[:2] / foot[3] * 0.5 + 0.5) * self.size
+                self._caption.draw(
+                    actor.caption, (float(at[0]), float(at[1])), self._targets.picture
+                )
 
     def show(self, target: moderngl.Framebuffer) -> None:
         """Copy the picture to a window's framebuffer of the same size."""

@@ -21,6 +21,7 @@ class Targets:
     def __init__(self, context: moderngl.Context, size: tuple[int, int], samples: int) -> None:
         half = (max(size[0] // 2, 1), max(size[1] // 2, 1))
         self.size = size
+        self._context = context
         self.resolved_image = context.texture(size, 4)
         self.reflection_image = context.texture(half, 4)
         self.reflection_image.repeat_x = self.reflection_image.repeat_y = False
@@ -37,5 +38,8 @@ class Targets:
 
     def release(self) -> None:
         """Free the framebuffers and all that is attached to them."""
+        # moderngl goes back to the framebuffer in use after it makes another: let it be one that
+        # outlives these.
+        self._context.detect_framebuffer(0).use()
         for target in (self.actors, self.resolved, self.backdrop, self.reflection, self.picture):
             release_all(target, *target.color_attachments, target.depth_attachment)

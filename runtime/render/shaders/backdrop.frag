@@ -4,7 +4,13 @@
 in vec2 place;
 layout(location = 0) out vec4 picture_colour;
 
-float noise(vec2 at) { return fract(sin(dot(at, vec2(12.9898, 78.233))) * 43758.5453); }
+// In whole numbers, so that every driver makes the same boards.
+float noise(vec2 cell) {
+    uvec2 q = uvec2(ivec2(floor(cell))) * uvec2(1597334673u, 3812015801u);
+    uint mixed = (q.x ^ q.y) * 1597334673u;
+    mixed = (mixed ^ (mixed >> 15)) * 2246822519u;
+    return float(mixed >> 8) / 16777216.0;
+}
 
 float smooth_noise(vec2 at) {
     vec2 cell = floor(at), t = fract(at);
@@ -34,7 +40,7 @@ float pool_light(vec2 at) {
     float sum = 0.0;
     for (int i = 0; i < int(stage.w); ++i) {
         float d = length(at - pools[i].xy) / pools[i].z;
-        sum += smoothstep(1.12, 0.55, d) * 0.85 + 0.28 * exp(-1.6 * d * d);
+        sum += smoothstep(1.15, 0.60, d) * 0.95 + 0.34 * exp(-0.9 * d * d);
     }
     return 1.0 - exp(-1.15 * sum);
 }

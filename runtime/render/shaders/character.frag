@@ -14,7 +14,7 @@ in vec2 uv;
 layout(location = 0) out vec4 picture_colour;
 
 const vec3 KEY = vec3(1.0, 0.88, 0.72) * 1.42;
-const vec3 RIM = vec3(0.36, 0.58, 1.0) * 1.7;
+const vec3 RIM = vec3(0.36, 0.60, 1.0) * 2.3;
 const vec3 SKY = vec3(0.090, 0.100, 0.160);
 const vec3 BOUNCE = vec3(0.150, 0.085, 0.045);
 const vec3 RIM_LEFT = vec3(-0.72, 0.36, -0.60);
@@ -49,11 +49,11 @@ void main() {
     float grazing = 1.0 - clamp(dot(n, to_eye), 0.0, 1.0);
     float edge = grazing * grazing;
     vec2 behind = clamp(vec2(dot(n, RIM_LEFT), dot(n, RIM_RIGHT)) + 0.22, 0.0, 1.0);
-    vec3 rim = RIM * (behind.x * 0.6 + behind.y) * (0.10 + 1.1 * edge);
+    vec3 rim = RIM * (behind.x * 0.6 + behind.y) * (0.12 + 1.15 * edge);
 
     float gloss = clamp(dot(n, normalize(key.xyz + to_eye)), 0.0, 1.0);
     gloss *= gloss; gloss *= gloss; gloss *= gloss; gloss *= gloss; gloss *= gloss;
-    vec3 lacquer = KEY * gloss * 0.20 * shadow;
+    vec3 lacquer = KEY * gloss * 0.26 * shadow;
 
     vec3 light_out = base.rgb * (diffuse + ambient) + rim * (0.45 * base.rgb + 0.17) + lacquer;
     picture_colour = vec4(encode(tone(light_out)), base.a);

@@ -3,6 +3,7 @@
 #include "colour.glsl"
 uniform sampler2D floor_mask;
 uniform sampler2D reflection;
+uniform float reach;
 in vec2 place;
 layout(location = 0) out vec4 add_and_keep;
 void main() {
@@ -14,5 +15,7 @@ void main() {
                       + texture(reflection, at + step_up - step_right).rgb
                       + texture(reflection, at - step_up + step_right).rgb
                       + texture(reflection, at - step_up - step_right).rgb);
+    float past = max(max(place.y - 1.0, -place.y), 0.0) / floor_area.w;
+    seen *= smoothstep(0.9 * reach, 0.1 * reach, past);
     add_and_keep = vec4(seen * 0.26, pow(keep, 1.0 / 2.2));
 }

@@ -27,6 +27,7 @@ void main() {
     float shine = pow(max(dot(n, vec3(-0.32, 0.52, 0.79)), 0.0), 24.0);
     vec3 body = colour.rgb * (0.30 + 0.85 * clamp(dot(n, vec3(-0.25, 0.45, 0.86)), 0.0, 1.0));
     body += vec3(0.55) * shine;
-    body *= mix(0.10, 1.0, smoothstep(-0.5, -1.6, distance_out));
+    float outline = min(1.5, 0.42 * radius);
+    body *= mix(0.12, 1.0, smoothstep(0.3 - outline, -0.3 - outline, distance_out));
     premultiplied = vec4(encode(tone(body)), 1.0) * (inside * colour.a);
 }

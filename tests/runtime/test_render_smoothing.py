@@ -1,0 +1,123 @@
+import math
+
+import numpy as np
+import trimesh
+
+from devices.skeleton import Skeleton
+from runtime.character import Character, Material, Surface
+from runtime.render.smoothing import (
+    CREASE,
+    fill_draw_vertices,
+    is_closed,
+    split_vertices,
+)
+
+
+def character_of(mesh: trimesh.Trimesh) -> Character:
+    count = len(mesh.vertices)
+    surface = Surface(
+        vertex=np.arange(count),
+        faces=np.asarray(mesh.faces, dtype=np.int32),
+        colors=np.ones((count, 4), dtype=np.float32),
+        uvs=None,
+        materials=(Material(np.ones(4, dtype=np.float32)),),
+        face_material=np.zeros(len(mesh.faces), dtype=np.int64),
+    )
+    bone = Skeleton(("root",), np.array([-1]), np.zeros((1, 3)))
+    return Character(
+        name="shape",
+        vertices=np.asarray(mesh.vertices, dtype=np.float64),
+        faces=np.asarray(mesh.faces, dtype=np.int64),
+        skeleton=bone,
+        weights=None,
+        surface=surface,
+        placement=np.eye(4),
+    )
+
+
+def drawn(character: Character, crease: float = CREASE) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (D, 3) and normals (D, 3) as they go to the GPU."""
+    split = split_vertices(character, crease=crease)
+    out = np.full((len(split.welded), 6), np.nan, dtype=np.float32)
+    fill_draw_vertices(
+        character.vertices,
+        split.faces,
+        split.group_start,
+        split.group_corners,
+        split.welded,
+        split.group,
+        np.zeros((3 * len(split.faces), 3), dtype=np.float32),
+        np.zeros((len(split.group_start) - 1, 3), dtype=np.float32),
+        out,
+    )
+    return out[:, :3], out[:, 3:]
+
+
+def test_a_sphere_is_smooth_and_its_normals_point_outward() -> None:
+    sphere = character_of(trimesh.creation.icosphere(subdivisions=3))
+    positions, normals = drawn(sphere)
+    assert len(positions) == len(sphere.vertices)
+    assert (positions * normals).sum(axis=1).min() > 0.9995
+
+
+def test_a_box_is_sharp_and_each_corner_is_drawn_for_three_sides() -> None:
+    _, normals = drawn(character_of(trimesh.creation.box()))
+    assert len(normals) == 24
+    np.testing.assert_allclose(np.abs(normals).max(axis=1), 1.0, atol=1e-6)
+
+
+def test_normals_do_not_depend_on_which_diagonal_cuts_a_side() -> None:
+    # Three right angles meet at a box's corner, cut by one to two triangles a side.
+    positions, normals = drawn(character_of(trimesh.creation.box()), crease=math.pi)
+    assert len(positions) == 8
+    np.testing.assert_allclose(normals, positions * 2.0 / math.sqrt(3.0), atol=1e-6)
+
+
+def test_a_seam_of_the_file_does_not_show_in_the_normals() -> None:
+    sphere = trimesh.creation.icosphere(subdivisions=2)
+    whole = character_of(sphere)
+    surface = whole.surface
+    torn = Surface(  # every face has vertices of its own in the file
+        vertex=surface.faces.reshape(-1).astype(np.int64),
+        faces=np.arange(3 * len(surface.faces), dtype=np.int32).reshape(-1, 3),
+        colors=np.ones((3 * len(surface.faces), 4), dtype=np.float32),
+        uvs=None,
+        materials=surface.materials,
+        face_material=surface.face_material,
+    )
+    split = Character("torn", whole.vertices, whole.faces, whole.skeleton, None, torn, np.eye(4))
+    positions, normals = drawn(split)
+    assert len(positions) == 3 * len(surface.faces)
+    assert (positions * normals).sum(axis=1).min() > 0.999
+
+
+def test_faces_that_disagree_about_outside_do_not_cancel() -> None:
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
+    faces = np.array([[0, 1, 2], [0, 3, 2]])  # the second runs the other way round
+    _, normals = drawn(character_of(trimesh.Trimesh(vertices, faces, process=False)))
+    np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-6)
+
+
+def test_a_face_without_area_gives_no_nan() -> None:
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 0, 0]], dtype=float)
+    faces = np.array([[0, 1, 2], [0, 3, 1], [1, 1, 3]])
+    _, normals = drawn(character_of(trimesh.Trimesh(vertices, faces, process=False)))
+    assert np.isfinite(normals).all()
+
+
+def test_two_runs_agree_to_the_last_bit() -> None:
+    torus = character_of(trimesh.creation.torus(1.0, 0.3))
+    assert drawn(torus)[1].tobytes() == drawn(torus)[1].tobytes()
+
+
+def test_only_watertight_shapes_hide_their_inside() -> None:
+    box = trimesh.creation.box()
+    faces = np.asarray(box.faces, dtype=np.int32)
+    assert is_closed(np.asarray(box.vertices), faces)
+    assert not is_closed(np.asarray(box.vertices), faces[1:])  # one triangle is missing
+
+
+def test_a_shape_turned_inside_out_is_drawn_from_both_sides() -> None:
+    box = trimesh.creation.box()
+    faces = np.asarray(box.faces, dtype=np.int32)[:, ::-1]
+    assert not is_closed(np.asarray(box.vertices), faces)
