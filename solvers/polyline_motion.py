@@ -107,15 +107,23 @@ def basis_change(
 
 
 def bone_samples(source_rest: Array, target_rest: Array) -> tuple[NDArray[np.int64], Array]:
-    """Where each target bone samples q: source bone i and share u of the way to bone i + 1."""
-    knots = _middles(source_rest)
-    samples = _middles(target_rest)
+    """Where each target bone samples q: between which two source bones, and at which share.
+
+    Returns:
+        (Q - 1, 2) the source bones on either side; (Q - 1,) the share of the way to the second.
+        Source bones without length turn nothing.
+    """
+    lengths = np.linalg.norm(np.diff(source_rest, axis=0), axis=1)
+    real = np.flatnonzero(lengths > 1e-9 * lengths.sum())
+    if len(real) == 0:
+        real = np.arange(len(lengths))
+    knots, samples = _middles(source_rest)[real], _middles(target_rest)
     samples[-1] = 1.0
-    bones = np.clip(np.searchsorted(knots, samples, side="right") - 1, 0, len(knots) - 1)
-    following = np.minimum(bones + 1, len(knots) - 1)
-    gaps = knots[following] - knots[bones]
-    shares = np.divide(samples - knots[bones], gaps, out=np.zeros(len(samples)), where=gaps > 0)
-    return bones, np.clip(shares, 0.0, 1.0)
+    before = np.clip(np.searchsorted(knots, samples, side="right") - 1, 0, len(knots) - 1)
+    after = np.minimum(before + 1, len(knots) - 1)
+    gaps = knots[after] - knots[before]
+    shares = np.divide(samples - knots[before], gaps, out=np.zeros(len(samples)), where=gaps > 0)
+    return np.column_stack([real[before], real[after]]), np.clip(shares, 0.0, 1.0)
 
 
 class ChainRetarget:
@@ -310,14 +318,14 @@ def _sample(turns: Array, bones: NDArray[np.int64], shares: Array, change: Array
     carried = (0.0, 0.0, 0.0, 1.0)
     at = -1
     for j in range(len(bones)):
-        i = bones[j]
-        while at < i:
+        before, after = bones[j]
+        while at < before:
             at += 1
             turn = (turns[at, 0], turns[at, 1], turns[at, 2], turns[at, 3])
             carried = normalized(multiply(carried, turn))
         q = carried
-        if i + 1 < len(turns) and shares[j] > 0.0:
-            turn = (turns[i + 1, 0], turns[i + 1, 1], turns[i + 1, 2], turns[i + 1, 3])
+        if after > before:  # those in between have no length and turn nothing
+            turn = (turns[after, 0], turns[after, 1], turns[after, 2], turns[after, 3])
             q = multiply(carried, power(turn, shares[j]))
         for k in range(3):
             sampled[j, k] = change[k, 0] * q[0] + change[k, 1] * q[1] + change[k, 2] * q[2]

@@ -1,0 +1,1 @@
+"""Benchmarks: each module has `run() -> dict`, prints a table and returns its figures."""

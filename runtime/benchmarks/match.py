@@ -1,0 +1,116 @@
+"""How long matching and driving a character take each frame.
+
+Matching a performer with 2 to 5 branches against characters of 200 nodes, beside the budget of
+0.5 ms; and the motion of such a match, from joints to all nodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from time import perf_counter
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.abstraction import simplify
+from solvers.matching import SIZE_PREFERENCE, Match, TargetHierarchy
+from solvers.polyline_motion import ChainRetarget
+from solvers.skeleton_pose import SkeletonPose
+from solvers.tree import Tree
+
+BUDGET_MS = 0.5
+FRAMES = 300
+NODES = 200
+_VIEW = np.eye(3)
+
+Figures = dict[str, float]
+
+
+def run() -> dict[str, object]:
+    """Print a table and return it: milliseconds at the median and the 99th percentile."""
+    targets = {"tentacles": _star(8), "sea urchin": _star(40), "bush": _bush()}
+    matching: dict[str, Figures] = {}
+    print(f"match: {NODES} nodes, best 20 of all, {FRAMES} poses; budget {BUDGET_MS} ms")
+    print(f"{'character':>12} {'branches':>8} {'p50 ms':>8} {'p99 ms':>8} {'motion':>8}")
+    for name, target in targets.items():
+        start = perf_counter()
+        hierarchy = TargetHierarchy(target)
+        built = 1e3 * (perf_counter() - start)
+        for branches in (2, 3, 4, 5):
+            source = _star(branches, count=3 * branches + 1)
+            figures = _measure(hierarchy, source) | {"build": built}
+            matching[f"{name}, {branches} branches"] = figures
+            print(
+                f"{name:>12} {branches:>8} {figures['p50']:8.3f} {figures['p99']:8.3f}"
+                f" {figures['motion_p50']:8.3f}"
+            )
+    return {"budget_ms": BUDGET_MS, "nodes": NODES, "match_ms": matching}
+
+
+def _measure(hierarchy: TargetHierarchy, rest: Tree) -> Figures:
+    source = simplify(rest)
+    rng = np.random.default_rng(0)
+    poses = rest.positions + rng.normal(scale=0.03, size=(FRAMES, *rest.positions.shape))
+
+    def match(pose: NDArray[np.float64]) -> list[Match]:
+        return hierarchy.rank(source, _VIEW, pose, size_preference=SIZE_PREFERENCE)
+
+    best = match(poses[0])[0]
+    drive = _driver(hierarchy.tree, rest, best)
+    drive(poses[0])
+    matched, moved = _times(match, poses), _times(drive, poses)
+    return {
+        "p50": float(np.median(matched)),
+        "p99": float(np.percentile(matched, 99)),
+        "motion_p50": float(np.median(moved)),
+        "motion_p99": float(np.percentile(moved, 99)),
+    }
+
+
+def _driver(target: Tree, rest: Tree, match: Match) -> Callable[[NDArray[np.float64]], object]:
+    """What a frame costs once a match is chosen: rotations of all chains, then all nodes."""
+    skeleton = SkeletonPose(target, match.root, [chain for _, chain in match.pairs])
+    chains = [
+        (
+            list(source),
+            ChainRetarget(
+                rest.positions[list(source)], target.positions[list(driven)], _VIEW, _VIEW
+            ),
+        )
+        for source, driven in match.pairs
+    ]
+    return lambda pose: skeleton.pose([chain.rotations(pose[nodes]) for nodes, chain in chains])
+
+
+def _times(
+    function: Callable[[NDArray[np.float64]], object], poses: NDArray[np.float64]
+) -> list[float]:
+    """Milliseconds for each pose."""
+    times = []
+    for pose in poses:
+        start = perf_counter()
+        function(pose)
+        times.append(1e3 * (perf_counter() - start))
+    return times
+
+
+def _star(arms: int, count: int = NODES) -> Tree:
+    """Arms of equal length around one node, in the screen plane."""
+    each = (count - 1) // arms
+    parents, positions = [-1], [(0.0, 0.0, 0.0)]
+    for arm in range(arms):
+        angle = 2.0 * np.pi * (arm + 0.3) / arms
+        for step in range(1, each + 1):
+            parents.append(len(parents) - 1 if step > 1 else 0)
+            positions.append((step / each * np.cos(angle), step / each * np.sin(angle), 0.0))
+    return Tree(np.array(parents), np.array(positions))
+
+
+def _bush() -> Tree:
+    """A tree with many forks, as a surface with fringes gives."""
+    rng = np.random.default_rng(1)
+    parents, positions = [-1], [np.zeros(3)]
+    for node in range(1, NODES):
+        parents.append(node - 1 if rng.random() < 0.75 else int(rng.integers(0, node)))
+        positions.append(positions[parents[-1]] + 0.1 * rng.normal(size=3))
+    return Tree(np.array(parents), np.array(positions))
