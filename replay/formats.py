@@ -13,9 +13,9 @@ from replay.kinect_laban import read_laban, recognises_laban
 from replay.kinect_msr import read_msr, recognises_msr
 from replay.kinect_ntu import read_ntu, recognises_ntu
 from replay.kinect_ut import read_ut, recognises_ut
-from replay.leap_files import is_leap, read_leap
-from replay.mcap_file import is_mcap, read_mcap
-from replay.mediapipe_files import is_mediapipe, read_mediapipe
+from replay.leap_files import read_leap, recognises_leap
+from replay.mcap_file import read_mcap, recognises_mcap
+from replay.mediapipe_files import read_mediapipe, recognises_mediapipe
 from replay.recording import Recording
 
 HEAD_BYTES = 4096
@@ -39,9 +39,9 @@ class Format:
 def formats() -> tuple[Format, ...]:
     """Every kind of recording that can be opened, the most certain to recognise first."""
     return (
-        Format("Bunraku recording (MCAP)", is_mcap, read_mcap),
-        Format("Leap Motion messages", is_leap, read_leap),
-        Format("MediaPipe landmarks", is_mediapipe, read_mediapipe),
+        Format("Bunraku recording (MCAP)", recognises_mcap, read_mcap),
+        Format("Leap Motion messages", recognises_leap, read_leap),
+        Format("MediaPipe landmarks", recognises_mediapipe, read_mediapipe),
         Format("Azure Kinect joints (CSV)", recognises_azure_csv, read_azure_csv),
         Format("Kinect v2, Labanotation Suite (CSV)", recognises_laban, read_laban),
         Format("Kinect v2, NTU RGB+D (.skeleton)", recognises_ntu, read_ntu),

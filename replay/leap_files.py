@@ -73,7 +73,7 @@ class LeapFrame:
     hands: list[Hand]
 
 
-def is_leap(path: Path, head: bytes) -> bool:
+def recognises_leap(path: Path, head: bytes) -> bool:
     """Whether a file begins with Leap messages, plain or compressed."""
     text = head.lstrip()
     if text[:1] in (b"{", b"["):

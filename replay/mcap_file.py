@@ -155,7 +155,7 @@ def _array(value: Any, shape: tuple[int, ...]) -> NDArray[np.float64]:
     return array
 
 
-def is_mcap(path: Path, head: bytes) -> bool:
+def recognises_mcap(path: Path, head: bytes) -> bool:
     """Whether a file begins as MCAP files do."""
     return head.startswith(MAGIC)
 

@@ -37,7 +37,7 @@ USUAL_RATE = 25.0
 _NOSE_TIP = ("1", "4")
 
 
-def is_mediapipe(path: Path, head: bytes) -> bool:
+def recognises_mediapipe(path: Path, head: bytes) -> bool:
     """Whether a file begins as a .pose file, or as text with MediaPipe's landmarks."""
     return has_pose_header(head) or has_landmark_text(head)
 

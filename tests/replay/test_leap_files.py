@@ -14,7 +14,7 @@ from devices.errors import InputError
 from devices.leap_joints import FINGERS, chest, leap_to_world
 from replay import leap_files
 from replay.formats import read_recording
-from replay.leap_files import is_leap, read_leap
+from replay.leap_files import read_leap, recognises_leap
 from replay.lz_string import lz_pieces
 from replay.recording import Recording
 
@@ -111,7 +111,7 @@ def test_a_compressed_document_is_read(tmp_path: Path) -> None:
     plain = document(tmp_path / "a.json", frames)
     packed = tmp_path / "a.json.lz"
     packed.write_bytes(lz_compress(plain.read_text()))
-    assert is_leap(packed, packed.read_bytes()[:4096])
+    assert recognises_leap(packed, packed.read_bytes()[:4096])
     np.testing.assert_array_equal(read_leap(packed).positions, read_leap(plain).positions)
 
 
@@ -331,7 +331,7 @@ def recordings(shared: Path) -> list[Path]:
 
 def test_real_recordings_are_known_and_read_whole(shared: Path) -> None:
     for path in recordings(shared):
-        assert is_leap(path, path.read_bytes()[:4096])
+        assert recognises_leap(path, path.read_bytes()[:4096])
         recording = read_recording(path)
         assert len(recording) > 50
         assert 0.5 < recording.seconds < 60

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from devices.errors import InputError
 from devices.mediapipe_joints import HAND_LANDMARKS, POSE_LANDMARKS
 from replay.formats import read_recording
-from replay.mediapipe_files import is_mediapipe, read_mediapipe
+from replay.mediapipe_files import read_mediapipe, recognises_mediapipe
 from replay.recording import Recording
 
 WIDTH, HEIGHT, FRAMES = 320, 240, 4
@@ -247,7 +247,7 @@ def json_list() -> str:
 def test_text_in_many_forms_holds_the_same(tmp_path: Path, make: object) -> None:
     assert callable(make)
     path = saved(tmp_path / "a.txt", make())
-    assert is_mediapipe(path, path.read_bytes()[:4096])
+    assert recognises_mediapipe(path, path.read_bytes()[:4096])
     recording = read_mediapipe(path)
     np.testing.assert_allclose(recording.times, 0.1 * np.arange(FRAMES), atol=1e-12)
     np.testing.assert_allclose(place(recording, 3, "right_wrist"), [-0.35, 0.3, 0.05], atol=1e-9)
@@ -296,7 +296,7 @@ def test_other_tables_are_not_taken_for_landmarks() -> None:
         b'{"landmarksmanship": 1}',
         b"\xff",
     ):
-        assert not is_mediapipe(Path("a.csv"), head)
+        assert not recognises_mediapipe(Path("a.csv"), head)
 
 
 @settings(max_examples=150, deadline=None)
