@@ -252,9 +252,10 @@ def _whole_frames(path: Path, counts: list[int], columns: int, first_line: int) 
     for line, count in enumerate(counts):
         held += count
         if held > columns:
+            begins = next(n for n in range(end, line + 1) if counts[n])
             raise InputError(
-                f"{path}, line {first_line + line}: a frame should have {columns} values as the "
-                f"hierarchy declares, got {held}"
+                f"{path}, line {first_line + begins}: the frame here should have {columns} values, "
+                f"as the hierarchy declares, but line {first_line + line} brings it to {held}"
             )
         if held == columns:
             held, end, frames = 0, line + 1, frames + 1
