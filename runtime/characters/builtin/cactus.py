@@ -6,13 +6,14 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from runtime.characters.builtin.face import Face, paints
-from runtime.characters.builtin.sculpture import Array, Focus, Limb, Paint, Sculpture
+from runtime.characters.builtin.sculpture import Array, Limb, Paint, Sculpture
 from runtime.characters.builtin.signed_distance import (
     Field,
     curve,
     displaced,
     ellipsoid,
     grown,
+    in_front,
     lathe,
     smooth_difference,
     smooth_union,
@@ -121,9 +122,8 @@ def sculpt() -> Sculpture:
         apart=0.085,
         eye=(0.034, 0.044),
         pupil=(0.034, 0.044),
-        smile=(0.055, 0.036, 1.02, 0.0105),
+        smile=(0.048, 0.030, 1.012, 0.0085),
         cheek=(0.138, 1.015, 0.036),
-        beyond=0.05,
     )
     pot = lathe(
         [
@@ -142,12 +142,12 @@ def sculpt() -> Sculpture:
     layers = (
         Paint(ellipsoid((0, 0.55, 0), (1.0, 0.5, 1.0)), "#2f9e5b", softness=0.5),
         Paint(_spines(), "#f6f3c8", softness=0.012),
-        Paint(pot, "#d9693f"),
-        Paint(_zigzag(), "#ffe0b5"),
+        Paint(pot, "#d9693f", softness=0.008),
+        Paint(_zigzag(), "#ffe0b5", softness=0.008),
         Paint(soil, "#5a3a2c", softness=0.02),
         Paint(grown(0.008, petals, stalk), "#ff5fa2", softness=0.012),
         Paint(grown(0.004, heart), "#ffd23f", softness=0.012),
-        *paints(face, white=None),
+        *paints(face, in_front(0.05), white=None),
     )
     limbs = [
         Limb("trunk", np.array([(0, y, 0) for y in (0.70, 0.78, 0.86)])),
@@ -164,5 +164,4 @@ def sculpt() -> Sculpture:
         "#4cc274",
         layers,
         tuple(limbs),
-        Focus((0.0, 1.05, 0.22), 0.19, 0.36),
     )

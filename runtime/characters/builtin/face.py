@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 from runtime.characters.builtin.sculpture import Paint
@@ -9,7 +10,6 @@ from runtime.characters.builtin.signed_distance import (
     Field,
     curve,
     ellipsoid,
-    seen_from_front,
     tube,
     union,
 )
@@ -26,7 +26,6 @@ class Face:
         pupil: half-width and half-height of a pupil.
         smile: half-width, depth of its curve, height of its corners, half-thickness.
         cheek: x, y and radius.
-        beyond: only what lies in front of this z is painted.
     """
 
     y: float
@@ -35,7 +34,6 @@ class Face:
     pupil: tuple[float, float]
     smile: tuple[float, float, float, float]
     cheek: tuple[float, float, float]
-    beyond: float
 
 
 def both(x: float, y: float, radii: tuple[float, float]) -> Field:
@@ -43,12 +41,17 @@ def both(x: float, y: float, radii: tuple[float, float]) -> Field:
     return union(*(ellipsoid((side * x, y, 0.0), (*radii, radii[0])) for side in (1, -1)))
 
 
-def paints(face: Face, white: str | None = "#fffaf0", dark: str = "#1c1226") -> tuple[Paint, ...]:
-    """The layers of the face; without `white` the pupils stand alone, like beads."""
+def paints(
+    face: Face,
+    decal: Callable[[Field], Field],
+    *,
+    white: str | None = "#fffaf0",
+    dark: str = "#1c1226",
+) -> tuple[Paint, ...]:
+    """The layers of the face, each region put on the surface by `decal`.
 
-    def decal(field: Field) -> Field:
-        return seen_from_front(field, face.beyond)
-
+    Without `white` the pupils stand alone, like beads.
+    """
     width, depth, height, thickness = face.smile
     mouth = curve([(-width, height, 0), (0, height - depth, 0), (width, height, 0)], 15)
     glint = 0.42 * face.pupil[0]

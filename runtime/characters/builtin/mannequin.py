@@ -6,11 +6,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from runtime.characters.builtin.face import Face, paints
-from runtime.characters.builtin.sculpture import Array, Focus, Limb, Paint, Sculpture
+from runtime.characters.builtin.sculpture import Array, Limb, Paint, Sculpture
 from runtime.characters.builtin.signed_distance import (
     Field,
     ellipsoid,
     grown,
+    in_front,
     smooth_union,
     taper,
     tube,
@@ -100,23 +101,21 @@ def sculpt() -> Sculpture:
         pupil=(0.016, 0.021),
         smile=(0.032, 0.018, 1.518, 0.0060),
         cheek=(0.066, 1.526, 0.02),
-        beyond=0.03,
     )
     layers = (
         Paint(_grain, "#d29a5e", softness=1.2, strength=0.4),
         Paint(union(*balls), "#8a4f2b", softness=0.012),
         Paint(grown(0.006, *beret), "#d8373f", softness=0.010),
-        *paints(face, white=None),
+        *paints(face, in_front(0.03), white=None),
     )
     return Sculpture(
         smooth_union(0.014, *wood, *balls, *beret),
         (-0.78, -0.05, -0.24),
         (0.78, 1.84, 0.32),
-        0.0215,
+        0.024,
         "#ecc08a",
         layers,
         _skeleton(),
-        Focus((0.0, 1.56, 0.12), 0.14, 0.36),
     )
 
 
@@ -133,13 +132,9 @@ def _skeleton() -> tuple[Limb, ...]:
     ]
     for side, name in ((1, "left"), (-1, "right")):
         flip = np.array([side, 1, 1])
+        palm = 0.2 * _WRIST + 0.8 * _FINGERS
         arm = np.vstack(
-            [
-                np.linspace(_SHOULDER, _ELBOW, 3),
-                np.linspace(_ELBOW, _WRIST, 3)[1:],
-                0.5 * (_WRIST + _FINGERS),
-                0.15 * _WRIST + 0.85 * _FINGERS,
-            ]
+            [np.linspace(_SHOULDER, _ELBOW, 4), np.linspace(_ELBOW, _WRIST, 4)[1:], palm]
         )
         leg = np.vstack(
             [

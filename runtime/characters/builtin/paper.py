@@ -6,17 +6,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from runtime.characters.builtin.face import Face, paints
-from runtime.characters.builtin.sculpture import Array, Focus, Limb, Paint, Sculpture
+from runtime.characters.builtin.sculpture import Array, Limb, Paint, Sculpture
 from runtime.characters.builtin.signed_distance import (
     Field,
     curve,
-    seen_from_front,
     tube,
     union,
 )
 
-_COLUMNS, _ROWS = 56, 80
-_STEP = 0.0164
+_COLUMNS, _ROWS = 46, 66
+_STEP = 0.02
 _HALF_WIDTH, _HEIGHT = 0.5 * _COLUMNS * _STEP, _ROWS * _STEP
 _HALF_THICKNESS, _CORNER = 0.007, 0.075
 
@@ -75,6 +74,13 @@ def _between_sides(points: Array) -> Array:
     return distance
 
 
+def _on_front(field: Field) -> Field:
+    def drawn(points: Array) -> Array:
+        return np.maximum(field(points * [1, 1, 0]), _bend(points) - points[:, 2])
+
+    return drawn
+
+
 def _line(axis: int, place: int) -> Field:
     """One row or column of vertices, on both sides."""
     at = place * _STEP
@@ -90,18 +96,17 @@ def sculpt() -> Sculpture:
         pupil=(0.050, 0.072),
         smile=(0.150, 0.105, 0.745, 0.017),
         cheek=(0.255, 0.735, 0.060),
-        beyond=-1.0,
     )
-    ruled = [_line(1, row) for row in (8, 14, 20, 26, 71)]
+    ruled = [_line(1, row) for row in (7, 12, 17, 22, 58)]
     brows = [
         tube(curve([(s * 0.19, 1.0, 0), (s * 0.14, 1.028, 0), (s * 0.085, 1.01, 0)], 9), 0.012)
         for s in (1, -1)
     ]
     layers = (
         Paint(union(*ruled), "#8fbdf0", softness=0.004),
-        Paint(_line(0, -22), "#f07f8c", softness=0.004),
-        *paints(face, white=None, dark="#2b3a8c"),
-        Paint(seen_from_front(union(*brows), -1.0), "#2b3a8c"),
+        Paint(_line(0, -18), "#f07f8c", softness=0.004),
+        *paints(face, _on_front, white=None, dark="#2b3a8c"),
+        Paint(_on_front(union(*brows)), "#2b3a8c"),
     )
     return Sculpture(
         _between_sides,
@@ -111,7 +116,6 @@ def sculpt() -> Sculpture:
         "#fdf8ea",
         layers,
         _skeleton(),
-        Focus((0.0, 0.86, 0.03), 0.26, 1.0),
         mesh=_mesh(),
     )
 

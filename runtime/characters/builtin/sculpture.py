@@ -21,7 +21,7 @@ class Paint:
     Attributes:
         region: signed distance, negative where the paint is.
         color: sRGB, ``#rrggbb``.
-        softness: width of its border [m]; 0 is a crisp outline that the mesh's edges follow.
+        softness: width of its border [m]; 0 is a crisp outline, and the mesh's edges follow it.
         strength: how much of what lies below it hides, in [0, 1].
     """
 
@@ -29,15 +29,6 @@ class Paint:
     color: str
     softness: float = 0.0
     strength: float = 1.0
-
-
-@dataclass(frozen=True, slots=True)
-class Focus:
-    """Where triangles are smaller: `shrink` times at `center`, as elsewhere from 2 `radius` on."""
-
-    center: tuple[float, float, float]
-    radius: float
-    shrink: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,7 +57,6 @@ class Sculpture:
         base: the sRGB colour of what no paint covers.
         paints: from the bottom layer to the top one.
         limbs: its skeleton, the root limb first.
-        focus: where the mesh is finer: the face.
         mesh: vertices (n, 3) [m] and faces (m, 3) where the level set would not do: on what is
             thinner than its edges are long.
     """
@@ -78,7 +68,6 @@ class Sculpture:
     base: str
     paints: tuple[Paint, ...]
     limbs: tuple[Limb, ...]
-    focus: Focus
     mesh: tuple[Array, NDArray[np.int64]] | None = None
 
 

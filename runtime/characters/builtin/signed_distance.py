@@ -123,11 +123,11 @@ def intersection(*fields: Field) -> Field:
     return lambda points: reduce(np.maximum, (field(points) for field in fields))
 
 
-def seen_from_front(field: Field, beyond: float) -> Field:
-    """The field's section at z = 0 carried along Z, where z is larger than `beyond`: a decal."""
+def in_front(beyond: float) -> Callable[[Field], Field]:
+    """What takes a field's section at z = 0 along Z, to where z is larger than `beyond`."""
 
-    def decal(points: Array) -> Array:
-        return np.maximum(field(points * [1.0, 1.0, 0.0]), beyond - points[:, 2])
+    def decal(field: Field) -> Field:
+        return lambda points: np.maximum(field(points * [1.0, 1.0, 0.0]), beyond - points[:, 2])
 
     return decal
 

@@ -6,11 +6,12 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from runtime.characters.builtin.face import Face, paints
-from runtime.characters.builtin.sculpture import Array, Focus, Limb, Paint, Sculpture
+from runtime.characters.builtin.sculpture import Array, Limb, Paint, Sculpture
 from runtime.characters.builtin.signed_distance import (
     Field,
     curve,
     ellipsoid,
+    in_front,
     smooth_union,
     taper,
     tube,
@@ -112,7 +113,6 @@ def sculpt() -> Sculpture:
         pupil=(0.050, 0.062),
         smile=(0.062, 0.034, 0.725, 0.0095),
         cheek=(0.20, 0.742, 0.05),
-        beyond=0.05,
     )
     fins = union(*(ellipsoid((s * 0.27, 1.36, -0.04), (0.16, 0.13, 0.1)) for s in (1, -1)))
     layers = (
@@ -120,7 +120,7 @@ def sculpt() -> Sculpture:
         Paint(fins, "#ff9a5a", softness=0.12),
         Paint(_freckles(), "#c93c63", softness=0.014),
         Paint(_suckers(paths), "#ffe3cf", softness=0.014),
-        *paints(face),
+        *paints(face, in_front(0.05)),
     )
     limbs = [
         Limb(
@@ -136,9 +136,8 @@ def sculpt() -> Sculpture:
         smooth_union(0.03, smooth_union(0.07, _body(), arms), *eyes),
         (-0.94, -0.06, -0.32),
         (0.94, 1.68, 0.38),
-        0.028,
+        0.031,
         "#f2587a",
         layers,
         tuple(limbs),
-        Focus((0.0, 0.82, 0.22), 0.24, 0.36),
     )

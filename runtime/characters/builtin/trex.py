@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from runtime.characters.builtin.face import both
-from runtime.characters.builtin.sculpture import Focus, Limb, Paint, Sculpture
+from runtime.characters.builtin.sculpture import Limb, Paint, Sculpture
 from runtime.characters.builtin.signed_distance import (
     Field,
     curve,
     ellipsoid,
     grown,
-    seen_from_front,
+    in_front,
     smooth_difference,
     smooth_union,
     taper,
@@ -52,8 +52,8 @@ def _limbs() -> Field:
             )
         parts.append(tube(curve(_ARM * flip, 14), taper([0.062, 0.05, 0.046, 0.042], 14)))
         for claw in (-1, 1):
-            tip = np.array([0.462, 0.725 + 0.034 * claw, 0.325])
-            parts.append(tube([np.array(_ARM[-1]) * flip, tip * flip], [0.034, 0.021]))
+            tip = np.array([0.468, 0.725 + 0.044 * claw, 0.332])
+            parts.append(tube([np.array(_ARM[-1]) * flip, tip * flip], [0.038, 0.027]))
     return smooth_union(0.035, *parts)
 
 
@@ -139,7 +139,7 @@ def sculpt() -> Sculpture:
     teeth, crest = _teeth(), _crest()
     skin = smooth_union(0.05, smooth_union(0.05, _body(), _limbs()), _head())
     skin = smooth_union(0.02, skin, *crest)
-    solid = smooth_union(0.012, smooth_difference(0.02, skin, _grin()), *teeth)
+    solid = smooth_union(0.016, smooth_difference(0.025, skin, _grin()), *teeth)
     eye, pupil = both(0.122, 1.385, (0.062, 0.066)), both(0.115, 1.382, (0.038, 0.046))
     glint = union(*(ellipsoid((side * 0.115 + 0.013, 1.401, 0), 0.0165) for side in (1, -1)))
     nostrils = both(0.062, 1.215, (0.016, 0.012))
@@ -149,32 +149,31 @@ def sculpt() -> Sculpture:
         for toe in (-0.068, 0.0, 0.068)
     ]
     nails = [
-        ellipsoid((s * 0.474, 0.725 + 0.036 * c, 0.333), 0.022) for s in (1, -1) for c in (1, -1)
+        ellipsoid((s * 0.480, 0.725 + 0.052 * c, 0.340), 0.030) for s in (1, -1) for c in (1, -1)
     ]
     belly = ellipsoid((0, 0.62, 0.30), (0.185, 0.33, 0.22))
     layers = (
         Paint(_stripes(), "#2b8a5f", softness=0.03),
-        Paint(belly, "#fff0b8", softness=0.03),
+        Paint(belly, "#fff0b8", softness=0.05),
         Paint(ellipsoid((0, 1.0, 0.40), (0.22, 0.095, 0.26)), "#fff0b8", softness=0.03),
         Paint(both(0.185, 1.235, (0.05, 0.036)), "#ff8b7a", softness=0.04, strength=0.6),
         Paint(grown(0.006, _grin()), "#8c2440"),
-        Paint(grown(0.005, *teeth), "#fffdf2"),
+        Paint(grown(0.005, *teeth), "#fffdf2", softness=0.004),
         Paint(grown(0.006, *crest), "#ff9d3c", softness=0.014),
         Paint(union(*claws, *nails), "#fff6dd", softness=0.012),
-        Paint(seen_from_front(nostrils, 0.3), "#2a5c40", softness=0.01),
-        Paint(seen_from_front(eye, 0.02), "#fffaf0"),
-        Paint(seen_from_front(pupil, 0.02), "#1c1226"),
-        Paint(seen_from_front(glint, 0.02), "#ffffff"),
+        Paint(in_front(0.3)(nostrils), "#2a5c40", softness=0.01),
+        Paint(in_front(0.02)(eye), "#fffaf0"),
+        Paint(in_front(0.02)(pupil), "#1c1226"),
+        Paint(in_front(0.02)(glint), "#ffffff"),
     )
     return Sculpture(
         solid,
         (-0.92, -0.06, -0.62),
         (0.60, 1.60, 0.62),
-        0.0305,
+        0.0365,
         "#5fc46a",
         layers,
         _skeleton(),
-        Focus((0.0, 1.30, 0.28), 0.30, 0.42),
     )
 
 
