@@ -14,8 +14,9 @@ from PIL import Image
 from runtime.character import Character, Material
 from runtime.render.programs import release_all
 from runtime.render.smoothing import (
+    DeformingNormals,
     DrawVertices,
-    fill_draw_vertices,
+    bounding_box,
     is_closed,
     split_vertices,
 )
@@ -71,8 +72,8 @@ class Actor:
         self._split = split_vertices(character)
         self._rest_shape = character.vertices.shape
         self._closed = is_closed(character.vertices, self._split.faces)
-        self._scratch = _Scratch.of(self._split)
-        self._moving = context.buffer(reserve=max(self._scratch.out.nbytes, 4), dynamic=True)
+        self._normals = DeformingNormals(self._split)
+        self._moving = context.buffer(reserve=24 * len(self._split.welded), dynamic=True)
         self._parts, self._order = _parts(context, character)
         self._constant = context.buffer(_constant_attributes(character, self._split))
         triangles = self._split.triangles[self._order]
@@ -108,21 +109,10 @@ class Actor:
             raise ValueError(
                 f"Expected `vertices` to have shape {self._rest_shape}, got {vertices.shape}"
             )
-        split, scratch = self._split, self._scratch
-        fill_draw_vertices(
-            np.ascontiguousarray(vertices, dtype=np.float64),
-            split.faces,
-            split.group_start,
-            split.group_corners,
-            split.welded,
-            split.group,
-            scratch.corner_normals,
-            scratch.group_normals,
-            scratch.out,
-        )
+        vertices = np.ascontiguousarray(vertices, dtype=np.float64)
         self._moving.orphan()
-        self._moving.write(scratch.out)
-        self._box = np.array([vertices.min(axis=0), vertices.max(axis=0)])
+        self._moving.write(self._normals.fill(vertices))
+        self._box = bounding_box(vertices)
 
     def highlight(self, chains: Sequence[ArrayLike], colours: Sequence[ArrayLike]) -> None:
         """Light up polylines inside the surface; visible through it. No chains: none.
@@ -210,21 +200,6 @@ def _coverage(context: moderngl.Context, wanted: bool) -> Iterator[None]:
     yield
     for state in states:
         context.disable_direct(state)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Scratch:
-    corner_normals: NDArray[np.float32]
-    group_normals: NDArray[np.float32]
-    out: NDArray[np.float32]
-
-    @classmethod
-    def of(cls, split: DrawVertices) -> _Scratch:
-        return cls(
-            np.zeros((3 * len(split.faces), 3), dtype=np.float32),
-            np.zeros((max(len(split.group_start) - 1, 0), 3), dtype=np.float32),
-            np.zeros((len(split.welded), 6), dtype=np.float32),
-        )
 
 
 def _constant_attributes(character: Character, split: DrawVertices) -> bytes:

@@ -113,34 +113,47 @@ def is_closed(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> bool:
     return bool((volume[np.unique(piece)] > 0.0).all())
 
 
-@njit(cache=True, error_model="numpy")
-def fill_draw_vertices(  # noqa: PLR0917  (numba takes arrays by position)
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int32],
-    group_start: NDArray[np.int32],
-    group_corners: NDArray[np.int32],
-    welded: NDArray[np.int32],
-    group: NDArray[np.int32],
-    corner_normals: NDArray[np.float32],
-    group_normals: NDArray[np.float32],
-    out: NDArray[np.float32],
-) -> None:
-    """Write position and unit normal of each drawn vertex into `out` (D, 6).
+class DeformingNormals:
+    """Fills the vertex buffer of a deforming surface; keeps its scratch from frame to frame.
 
-    A group's normal is the sum of its faces' unit normals weighted by the angle at the corner
-    (Thurmer and Wuthrich 1998), which does not depend on how the surface was triangulated. Sums
-    run in a fixed order, so that two runs agree to the last bit.
+    A normal is the sum of its smoothing group's face normals, each weighted by the face's angle
+    there, so that it does not depend on how the surface was cut into triangles. Sums run in a
+    fixed order: two runs agree to the last bit.
+
+    Source: Thurmer and Wuthrich, Computing Vertex Normals from Polygonal Facets, 1998, section 2.
     """
+
+    def __init__(self, split: DrawVertices) -> None:
+        self._split = split
+        self._corners = np.zeros((3 * len(split.faces), 3))
+        self._groups = np.zeros((len(split.group_start) - 1, 3), dtype=np.float32)
+        self._out = np.zeros((len(split.welded), 6), dtype=np.float32)
+
+    def fill(self, vertices: NDArray[np.float64]) -> NDArray[np.float32]:
+        """Position and unit normal (D, 6) of each drawn vertex, for welded vertices (N, 3).
+
+        The array is overwritten by the next call.
+        """
+        split = self._split
+        _weigh_corners(vertices, split.faces, self._corners)
+        _sum_groups(split.group_start, split.group_corners, self._corners, self._groups)
+        _expand(vertices, self._groups, split.welded, split.group, self._out)
+        return self._out
+
+
+@njit(cache=True, error_model="numpy")
+def _weigh_corners(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32], out: NDArray[np.float64]
+) -> None:
+    """Each corner's face normal times its angle (3 F, 3); nothing where a face has no area."""
     for f in range(faces.shape[0]):
-        a, b, c = faces[f, 0], faces[f, 1], faces[f, 2]
-        ux, uy, uz = (vertices[b, 0] - vertices[a, 0], vertices[b, 1] - vertices[a, 1],
-                      vertices[b, 2] - vertices[a, 2])  # fmt: skip
-        vx, vy, vz = (vertices[c, 0] - vertices[a, 0], vertices[c, 1] - vertices[a, 1],
-                      vertices[c, 2] - vertices[a, 2])  # fmt: skip
+        a, b, c = vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]]
+        ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
+        vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
         nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
         double_area = math.sqrt(nx * nx + ny * ny + nz * nz)
         if double_area == 0.0:
-            corner_normals[3 * f : 3 * f + 3] = 0.0
+            out[3 * f : 3 * f + 3] = 0.0
             continue
         uv, uu = ux * vx + uy * vy + uz * vz, ux * ux + uy * uy + uz * uz
         at_a = math.atan2(double_area, uv)
@@ -148,23 +161,52 @@ def fill_draw_vertices(  # noqa: PLR0917  (numba takes arrays by position)
         for k in range(3):
             angle = at_a if k == 0 else at_b if k == 1 else math.pi - at_a - at_b
             weight = angle / double_area
-            corner_normals[3 * f + k, 0] = nx * weight
-            corner_normals[3 * f + k, 1] = ny * weight
-            corner_normals[3 * f + k, 2] = nz * weight
-    for g in range(group_start.shape[0] - 1):
+            out[3 * f + k, 0] = nx * weight
+            out[3 * f + k, 1] = ny * weight
+            out[3 * f + k, 2] = nz * weight
+
+
+@njit(cache=True, error_model="numpy")
+def _sum_groups(
+    start: NDArray[np.int32],
+    corners: NDArray[np.int32],
+    weighted: NDArray[np.float64],
+    out: NDArray[np.float32],
+) -> None:
+    """Unit normal (G, 3) of each smoothing group; zero where all its faces are degenerate."""
+    for g in range(start.shape[0] - 1):
         x = y = z = 0.0
-        for i in range(group_start[g], group_start[g + 1]):
-            corner = group_corners[i]
-            x += corner_normals[corner, 0]
-            y += corner_normals[corner, 1]
-            z += corner_normals[corner, 2]
+        for i in range(start[g], start[g + 1]):
+            x += weighted[corners[i], 0]
+            y += weighted[corners[i], 1]
+            z += weighted[corners[i], 2]
         length = max(math.sqrt(x * x + y * y + z * z), 1e-30)
-        group_normals[g, 0], group_normals[g, 1], group_normals[g, 2] = (
-            x / length,
-            y / length,
-            z / length,
-        )
+        out[g, 0] = x / length
+        out[g, 1] = y / length
+        out[g, 2] = z / length
+
+
+@njit(cache=True, error_model="numpy")
+def _expand(
+    vertices: NDArray[np.float64],
+    normals: NDArray[np.float32],
+    welded: NDArray[np.int32],
+    group: NDArray[np.int32],
+    out: NDArray[np.float32],
+) -> None:
     for d in range(welded.shape[0]):
         for axis in range(3):
             out[d, axis] = vertices[welded[d], axis]
-            out[d, 3 + axis] = group_normals[group[d], axis]
+            out[d, 3 + axis] = normals[group[d], axis]
+
+
+@njit(cache=True, error_model="numpy")
+def bounding_box(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
+    """(2, 3) least and greatest corner of (N, 3) points."""
+    box = np.empty((2, 3))
+    for axis in range(3):
+        low = high = vertices[0, axis]
+        for i in range(vertices.shape[0]):
+            low, high = min(low, vertices[i, axis]), max(high, vertices[i, axis])
+        box[0, axis], box[1, axis] = low, high
+    return box

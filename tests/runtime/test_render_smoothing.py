@@ -7,7 +7,8 @@ from devices.skeleton import Skeleton
 from runtime.character import Character, Material, Surface
 from runtime.render.smoothing import (
     CREASE,
-    fill_draw_vertices,
+    DeformingNormals,
+    bounding_box,
     is_closed,
     split_vertices,
 )
@@ -38,18 +39,7 @@ def character_of(mesh: trimesh.Trimesh) -> Character:
 def drawn(character: Character, crease: float = CREASE) -> tuple[np.ndarray, np.ndarray]:
     """Positions (D, 3) and normals (D, 3) as they go to the GPU."""
     split = split_vertices(character, crease=crease)
-    out = np.full((len(split.welded), 6), np.nan, dtype=np.float32)
-    fill_draw_vertices(
-        character.vertices,
-        split.faces,
-        split.group_start,
-        split.group_corners,
-        split.welded,
-        split.group,
-        np.zeros((3 * len(split.faces), 3), dtype=np.float32),
-        np.zeros((len(split.group_start) - 1, 3), dtype=np.float32),
-        out,
-    )
+    out = DeformingNormals(split).fill(character.vertices)
     return out[:, :3], out[:, 3:]
 
 
@@ -121,3 +111,8 @@ def test_a_shape_turned_inside_out_is_drawn_from_both_sides() -> None:
     box = trimesh.creation.box()
     faces = np.asarray(box.faces, dtype=np.int32)[:, ::-1]
     assert not is_closed(np.asarray(box.vertices), faces)
+
+
+def test_the_bounding_box_is_that_of_all_points() -> None:
+    points = np.random.default_rng(3).normal(size=(50, 3))
+    np.testing.assert_array_equal(bounding_box(points), [points.min(axis=0), points.max(axis=0)])
