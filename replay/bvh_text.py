@@ -172,7 +172,7 @@ class _Hierarchy:
 
     def _channels(self, joint: BvhJoint) -> None:
         count = self._word()
-        if not count.isdecimal() or int(count) > 99:
+        if not count.isdecimal() or len(count) > 2:
             self._fail(f"expected the number of channels, got {count!r}")
         for _ in range(int(count)):
             word = self._word()

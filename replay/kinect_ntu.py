@@ -23,6 +23,7 @@ from replay.recording import Recording
 _JOINTS = len(KINECT_V2.names)
 _JOINT_FIELDS = 12
 _BODY_FIELDS = 10
+_LONGEST_COUNT = 20  # characters; Python refuses to convert numbers of thousands
 _MOST_BODIES = 6  # that a Kinect v2 follows at a time
 
 
@@ -80,6 +81,8 @@ def read_ntu(path: Path) -> Recording:
 def _bodies(path: Path, notes: list[str]) -> list[_Body]:
     """Every body of every whole frame."""
     lines = [(at, line) for at, line in enumerate(read_lines(path), 1) if line.strip()]
+    if not lines:
+        raise InputError(f"{path}: holds no frame")
     rows = iter(lines)
     declared = _count(path, rows, 10**6)
     bodies: list[_Body] = []
@@ -113,7 +116,7 @@ def _frame(path: Path, rows: Iterator[tuple[int, str]], frame: int) -> list[_Bod
 
 def _count(path: Path, rows: Iterator[tuple[int, str]], most: int) -> int:
     at, line = next(rows)
-    if not line.strip().isdecimal() or int(line) > most:
+    if not line.strip().isdecimal() or len(line) > _LONGEST_COUNT or int(line) > most:
         raise InputError(f"{path}, line {at}: expected a count up to {most}, got {line[:60]!r}")
     return int(line)
 
@@ -121,6 +124,6 @@ def _count(path: Path, rows: Iterator[tuple[int, str]], most: int) -> int:
 def _fields(path: Path, rows: Iterator[tuple[int, str]], count: int) -> list[str]:
     at, line = next(rows)
     fields = line.split()
-    if len(fields) != count or not are_numbers(fields[1:]):
+    if len(fields) != count or not are_numbers(fields):
         raise InputError(f"{path}, line {at}: expected {count} numbers, got {line[:60]!r}")
     return fields
