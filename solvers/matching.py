@@ -13,8 +13,9 @@ with the same stretch on the character. Those inner pairs carry no score.
 
 More pairs can make a larger sum, so where a part of the character can take all of the performer's
 branches, it wins over one that can take fewer. With `size_preference` = 0 the order is that of the
-scores; above 0 each pair is worth that much more times the length of its target chain against the
-character's longest, so that limbs win over spurs that happen to point the same way.
+scores; above 0 each pair is worth that much more if its target chain is at least half as long as
+the character's longest, and proportionally less below: limbs win over spurs that happen to point
+the same way, and a tail does not win over a leg.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ Chain = tuple[int, ...]
 # A match's pairs, limbs, stops, root and level.
 _Plan = tuple[tuple[tuple[Chain, Chain], ...], int, tuple[int, ...], int, int]
 
-SIZE_PREFERENCE: Final = 0.4  # suits a live show: this much of a perfect pair for full size
+SIZE_PREFERENCE: Final = 0.8  # suits a live show, where the part that moves should be seen
 _FADE: Final = 0.05  # of the longest branch
 _REMEMBERED: Final = 4096  # matches whose chains are kept ready
 
@@ -83,7 +84,7 @@ class _Candidates:
     subtrees: tuple[SubTree, ...]
     starts: NDArray[np.int64]  # (C + 1,)
     vectors: Array  # (T, 3) from the sub-tree's centre, its longest branch of length one
-    sizes: Array  # (T,) length of the extended chain against the longest of all
+    sizes: Array  # (T,) 1 for extended chains at least half as long as the longest, less below
 
 
 class TargetHierarchy:
@@ -241,7 +242,7 @@ def _gather(
         block = np.array([branch.position for branch in subtree.branches])
         block -= tree.positions[subtree.centre]
         vectors[first:end] = block / max(np.linalg.norm(block, axis=1).max(), 1e-300)
-    sizes = lengths / max(lengths.max(initial=0.0), 1e-300)
+    sizes = np.minimum(2.0 * lengths / max(lengths.max(initial=0.0), 1e-300), 1.0)
     return _Candidates(tuple(chosen), starts, vectors, sizes)
 
 
