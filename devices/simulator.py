@@ -12,7 +12,6 @@ import numpy as np
 from devices.acts import ACTS, performance
 from devices.performance import RATE, Performance
 from devices.skeleton import Skeleton, SkeletonFrame
-from devices.stream import register_scheme
 
 BACKLOG_SECONDS = 1.0
 """What lies further back than this when a poll comes is not given any more."""
@@ -79,8 +78,6 @@ class Simulator:
         self.close()
 
 
-def _open(address: SplitResult) -> Simulator:
+def open_device(address: SplitResult) -> Simulator:
+    """Open ``sim://ACT``; the first act where none is named."""
     return Simulator(performance(address.netloc or ACTS[0]))
-
-
-register_scheme("sim", _open)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from importlib import import_module
 from typing import Protocol, Self
-from urllib.parse import SplitResult, urlsplit
+from urllib.parse import urlsplit
 
 from devices.errors import InputError
 from devices.skeleton import Skeleton, SkeletonFrame
@@ -36,19 +37,9 @@ class SkeletonStream(Protocol):
     def __exit__(self, *exc: object) -> None: ...
 
 
-Opener = Callable[[SplitResult], SkeletonStream]
-
-_openers: dict[str, Opener] = {}
-
-
-def register_scheme(scheme: str, opener: Opener) -> None:
-    """Let `open_stream` open addresses ``scheme://...`` with `opener`, given the split address."""
-    _openers[scheme] = opener
-
-
-def schemes() -> tuple[str, ...]:
-    """Kinds of address that `open_stream` can open."""
-    return tuple(sorted(_openers))
+ADAPTERS = {"sim": "devices.simulator"}
+"""The module of each kind of address. It has `open_device(address: SplitResult)`, and is imported
+only when such an address is opened, so that an SDK that is not there troubles nobody else."""
 
 
 def open_stream(url: str) -> SkeletonStream:
@@ -59,9 +50,8 @@ def open_stream(url: str) -> SkeletonStream:
             be opened.
     """
     address = urlsplit(url)
-    if address.scheme not in _openers:
-        known = ", ".join(f"{scheme}://" for scheme in sorted(_openers))
-        raise InputError(
-            f"cannot open {url!r}: no such kind of device; there are: {known or 'none'}"
-        )
-    return _openers[address.scheme](address)
+    if address.scheme not in ADAPTERS:
+        known = ", ".join(f"{scheme}://" for scheme in ADAPTERS)
+        raise InputError(f"cannot open {url!r}: no such kind of device; there are: {known}")
+    stream: SkeletonStream = import_module(ADAPTERS[address.scheme]).open_device(address)
+    return stream

@@ -75,12 +75,14 @@ class Director:
         self._source = simplify(performer.rest_tree())
         self._since = float("nan")
 
-    def direct(self, pose: Pose, frame: SkeletonFrame) -> None:
-        """While matching, show the best match of this pose; accept it once it has stood long."""
-        if (
-            not self.matching
-            or np.mean(frame.confidence[self._performer.joints] > 0.0) < LEAST_SEEN
-        ):
+    def direct(self, frame: SkeletonFrame) -> None:
+        """While matching, show the best match of this frame's pose; accept it in time.
+
+        A pose counts only with at least half of the driving joints in view.
+        """
+        pose = self._performer.pose
+        seen = np.mean(frame.confidence[self._performer.joints] > 0.0)
+        if not self.matching or pose is None or seen < LEAST_SEEN:
             return
         changed = self._match(pose, frame.time)
         if changed or np.isnan(self._since):

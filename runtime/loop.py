@@ -45,6 +45,7 @@ class FrameLoop:
 
     Attributes:
         frames: frames performed so far.
+        seconds: performer's time from the first of them to the last [s].
     """
 
     def __init__(
@@ -61,6 +62,8 @@ class FrameLoop:
         shown: bool = False,
     ) -> None:
         self.frames = 0
+        self.seconds = 0.0
+        self._began = float("nan")
         self._stream = stream
         self._performer = performer
         self._puppets = puppets
@@ -122,6 +125,8 @@ class FrameLoop:
                 motions.append(puppet.deform())
         self._motions = motions
         self._publish(frame.time)
+        self._began = frame.time if self.frames == 0 else self._began
+        self.seconds = frame.time - self._began
         self.frames += 1
 
     def _publish(self, time: float) -> None:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-import devices.simulator  # noqa: F401 - registers sim://
-from devices.stream import schemes
+from devices.stream import ADAPTERS
 from replay.formats import formats, recognise
 from replay.info import summary
 from runtime.cast import character_named, is_character
@@ -44,7 +43,7 @@ def _of_character(name: str) -> list[str]:
 def devices_there(options: argparse.Namespace) -> int:
     """Print the kinds of devices, recordings and built-in characters."""
     del options
-    print("devices:    " + ", ".join(f"{scheme}://" for scheme in schemes()))
+    print("devices:    " + ", ".join(f"{scheme}://" for scheme in ADAPTERS))
     print("recordings: " + ", ".join(kind.name for kind in formats()))
     print("characters: " + ", ".join(BUILTIN))
     return 0

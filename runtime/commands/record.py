@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import sys
 
-import devices.simulator  # noqa: F401 - registers sim://
 from devices.stream import open_stream
 from replay.mcap_writer import McapWriter
 from runtime.clock import Ticker

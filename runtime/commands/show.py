@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
-import devices.simulator  # noqa: F401 - registers sim://
-from devices.errors import InputError
 from devices.stream import SkeletonStream, open_stream
 from replay.builtin import builtin_recording
 from replay.formats import read_recording
@@ -20,10 +19,11 @@ from replay.recording import Recording
 from runtime.cast import character_named
 from runtime.characters.builtin import BUILTIN
 from runtime.clock import Ticker
+from runtime.controls import Controls
 from runtime.director import Choices, Director
 from runtime.loop import FrameLoop
 from runtime.mapping import Mapping, read_mapping
-from runtime.output.exports import open_export
+from runtime.output.export import open_export
 from runtime.output.frames import Frames
 from runtime.output.output import Output
 from runtime.output.point_cache import PointCache
@@ -35,6 +35,7 @@ from runtime.puppet import Puppet
 from runtime.render.camera import front_camera
 from runtime.render.context import headless_context
 from runtime.theatre import Theatre
+from runtime.window import Window
 
 TICKS = 60.0  # a second, where nothing else sets the pace
 STEADY = 1.0  # seconds that a live match stands before it performs by itself
@@ -42,39 +43,53 @@ STEADY = 1.0  # seconds that a live match stands before it performs by itself
 
 @dataclass(frozen=True, slots=True)
 class _Source:
-    """Where a show's motion comes from, and what is known of it beforehand."""
+    """Where a show's motion comes from, and what is known of it beforehand.
+
+    Attributes:
+        stream: gives the frames.
+        rate: about how many come in a second.
+        recording: what is played, or None when live.
+        patience: how long [s] a match must stand before it performs by itself.
+    """
 
     stream: SkeletonStream
     rate: float
     recording: Recording | None
+    patience: float
 
 
 def demo(options: argparse.Namespace) -> int:
-    """One built-in performance drives every built-in character."""
+    """Let one built-in performance drive every built-in character."""
     options.character = options.character or list(BUILTIN)
-    return _show(options, _played(builtin_recording("show"), options), patience=0.0)
+    if not _has_display():
+        options.headless = options.fast = True
+    return _show(options, _played(builtin_recording("show"), options))
 
 
 def replay(options: argparse.Namespace) -> int:
-    """A recorded stream drives characters."""
-    recording = read_recording(options.recording)
-    return _show(options, _played(recording, options), patience=0.0)
+    """Let a recorded stream drive characters."""
+    return _show(options, _played(read_recording(options.recording), options))
 
 
 def live(options: argparse.Namespace) -> int:
-    """A live stream drives characters."""
-    source = _Source(open_stream(options.device), TICKS, None)
-    return _show(options, source, patience=STEADY)
+    """Let a live stream drive characters."""
+    return _show(options, _Source(open_stream(options.device), TICKS, None, STEADY))
+
+
+def _has_display() -> bool:
+    if not sys.platform.startswith("linux"):
+        return True
+    return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
 def _played(recording: Recording, options: argparse.Namespace) -> _Source:
     pace = EveryFrame() if options.fast else RealTime(options.speed)
     seconds = recording.seconds
     rate = (len(recording) - 1) / seconds if seconds > 0.0 else TICKS
-    return _Source(Player(recording, pace, loop=options.loop), rate, recording)
+    return _Source(Player(recording, pace, loop=options.loop), rate, recording, 0.0)
 
 
-def _show(options: argparse.Namespace, source: _Source, *, patience: float) -> int:
+def _show(options: argparse.Namespace, source: _Source) -> int:
     """Open everything, run the loop to the end, close everything, whatever happens."""
     with ExitStack() as closing:
         stream = closing.enter_context(source.stream)
@@ -87,15 +102,13 @@ def _show(options: argparse.Namespace, source: _Source, *, patience: float) -> i
         recorder = None
         if options.record is not None:
             recorder = closing.enter_context(McapWriter(options.record, stream.skeleton))
-        theatre = _theatre(options, puppets, stream, outputs, closing)
-        camera = front_camera() if theatre is None else theatre.camera
-        director = Director(
-            performer,
-            puppets,
-            lambda: camera.view_rotation if theatre is None else theatre.camera.view_rotation,
-            Choices(options.match, options.chains == "extend", options.flip, patience),
-            [_by_hand(options, performer, puppet) for puppet in puppets],
-        )
+        window = None
+        if not options.headless:
+            window = closing.enter_context(Window("Bunraku", options.size))
+        theatre = _theatre(options, puppets, stream, outputs, window)
+        if theatre is not None:
+            closing.callback(theatre.close)
+        director = _director(options, performer, puppets, theatre, source)
         loop = FrameLoop(
             stream,
             performer,
@@ -105,20 +118,59 @@ def _show(options: argparse.Namespace, source: _Source, *, patience: float) -> i
             theatre=theatre,
             outputs=outputs,
             recorder=recorder,
+            shown=window is not None,
         )
+        controls = None
+        if window is not None and theatre is not None:
+            controls = Controls(window, theatre, director, stream)
         total = None if source.recording is None or options.loop else len(source.recording)
-        closing.callback(_tell, report, parts, puppets, performer, loop, source)
-        _run(loop, stream, closing.enter_context(Progress("performing", total)), options.fast)
+        closing.callback(_tell, report, parts, puppets, performer, loop, source.recording)
+        progress = closing.enter_context(Progress("performing", total))
+        _run(loop, stream, controls, progress, pace=None if options.fast else TICKS)
     return 0
 
 
-def _run(loop: FrameLoop, stream: SkeletonStream, progress: Progress, fast: bool) -> None:
-    ticker = Ticker(TICKS)
-    while not stream.ended:
+def _run(
+    loop: FrameLoop,
+    stream: SkeletonStream,
+    controls: Controls | None,
+    progress: Progress,
+    *,
+    pace: float | None,
+) -> None:
+    """Tick until the stream ends or the window is closed, `pace` times a second."""
+    ticker = None if pace is None else Ticker(pace)
+    while not stream.ended and not (controls is not None and controls.leaving):
         if loop.tick():
             progress.advance()
-        if not fast:
+        if controls is not None:
+            controls.present()
+            controls.serve()
+        if ticker is not None:
             ticker.wait()
+
+
+def _director(
+    options: argparse.Namespace,
+    performer: Performer,
+    puppets: Sequence[Puppet],
+    theatre: Theatre | None,
+    source: _Source,
+) -> Director:
+    by_hand: list[Mapping | None] = [
+        None
+        if options.mapping is None
+        else read_mapping(options.mapping, performer.skeleton, puppet.character.skeleton)
+        for puppet in puppets
+    ]
+    front = front_camera()
+    return Director(
+        performer,
+        puppets,
+        lambda: (front if theatre is None else theatre.camera).view_rotation,
+        Choices(options.match, options.chains == "extend", options.flip, source.patience),
+        by_hand,
+    )
 
 
 def _tell(
@@ -127,29 +179,22 @@ def _tell(
     puppets: Sequence[Puppet],
     performer: Performer,
     loop: FrameLoop,
-    source: _Source,
+    recording: Recording | None,
 ) -> None:
     """Put what is only known at the end into the report."""
     names = performer.skeleton.names
-    recording = source.recording
-    report.recorded(
-        frames=loop.frames + report.dropped if recording is None else len(recording),
-        joints=len(names),
-        seconds=loop.seconds if recording is None else recording.seconds,
-    )
+    if recording is None:
+        report.recorded(
+            frames=loop.frames + report.dropped, joints=len(names), seconds=loop.seconds
+        )
+    else:
+        report.recorded(frames=len(recording), joints=len(names), seconds=recording.seconds)
     for part, puppet in zip(parts, puppets, strict=True):
-        mapping = puppet.mapping
         pairs = [
             MatchedPair(tuple(names[joint] for joint in drive.source), drive.target)
-            for drive in mapping.drives
+            for drive in puppet.mapping.drives
         ]
-        part.matched(mapping.score, pairs)
-
-
-def _by_hand(options: argparse.Namespace, performer: Performer, puppet: Puppet) -> Mapping | None:
-    if options.mapping is None:
-        return None
-    return read_mapping(options.mapping, performer.skeleton, puppet.character.skeleton)
+        part.matched(puppet.mapping.score, pairs)
 
 
 def _theatre(
@@ -157,19 +202,18 @@ def _theatre(
     puppets: Sequence[Puppet],
     stream: SkeletonStream,
     outputs: Sequence[Sequence[Output]],
-    closing: ExitStack,
+    window: Window | None,
 ) -> Theatre | None:
-    if not any(output.needs_picture for kept in outputs for output in kept):
+    """The house, if anybody looks."""
+    if window is None and not any(output.needs_picture for kept in outputs for output in kept):
         return None
-    theatre = Theatre(
-        headless_context(),
-        options.size,
+    return Theatre(
+        headless_context() if window is None else window.context,
+        options.size if window is None else window.size,
         puppets,
         stream.skeleton,
         transparent=options.transparent,
     )
-    closing.callback(theatre.close)
-    return theatre
 
 
 def _outputs(
@@ -190,7 +234,7 @@ def _outputs(
             kept.append(closing.enter_context(PointCache(path, character)))
         if options.export is not None:
             path = options.export if alone else _of(options.export, character.name)
-            kept.append(closing.enter_context(open_export(path, character)))
+            kept.append(closing.enter_context(open_export(path, character, rate=rate)))
         outputs.append(kept)
     if options.video is not None:
         outputs[0].append(closing.enter_context(Video(options.video, rate=rate)))
@@ -202,6 +246,3 @@ def _outputs(
 def _of(path: Path, name: str) -> Path:
     """The file for one of several characters: OUT-squid.pc2 beside OUT.pc2."""
     return path.with_name(f"{path.stem}-{name}{path.suffix}")
-
-
-__all__ = ["InputError", "demo", "live", "replay", "sys"]
