@@ -38,7 +38,7 @@ def test_transparency_is_kept(tmp_path: Path) -> None:
 
 
 def test_pictures_of_an_earlier_longer_show_go_and_nothing_else_does(tmp_path: Path) -> None:
-    for name in ("000001.png", "000007.png", "7.png", "000007.jpg", "poster.png"):
+    for name in ("000001.png", "000002.png", "7.png", "000007.jpg", "poster.png"):
         (tmp_path / name).touch()
     with Frames(tmp_path) as frames:
         pass
