@@ -15,7 +15,6 @@ from runtime.characters.builtin.signed_distance import (
     smooth_union,
     taper,
     tube,
-    union,
 )
 
 _SHOULDER, _ELBOW = np.array([0.215, 1.285, 0.0]), np.array([0.395, 1.075, 0.0])
@@ -77,12 +76,12 @@ def sculpt() -> Sculpture:
     wood: list[Field] = [
         ellipsoid((0, 1.565, 0.012), (0.112, 0.152, 0.125)),
         tube([(0, 1.36, -0.005), (0, 1.44, 0)], [0.05, 0.046]),
-        tube([(0, 1.30, 0), (0, 1.22, 0.0), (0, 1.13, 0)], [0.135, 0.15, 0.118]),
-        ellipsoid((0, 1.24, 0.0), (0.192, 0.135, 0.112)),
+        tube([(0, 1.29, 0), (0, 1.22, 0.0), (0, 1.14, 0)], [0.112, 0.128, 0.104]),
+        ellipsoid((0, 1.275, 0.0), (0.185, 0.105, 0.098)),
         ellipsoid((0, 0.855, 0.0), (0.165, 0.115, 0.115)),
     ]
     balls: list[Field] = [
-        ellipsoid((0, 1.03, 0), (0.105, 0.10, 0.095)),
+        ellipsoid((0, 1.02, 0), (0.092, 0.088, 0.084)),
         ellipsoid((0, 1.40, 0), (0.058, 0.05, 0.058)),
     ]
     for side in (1, -1):
@@ -103,8 +102,8 @@ def sculpt() -> Sculpture:
         cheek=(0.066, 1.526, 0.02),
     )
     layers = (
-        Paint(_grain, "#d29a5e", softness=1.2, strength=0.4),
-        Paint(union(*balls), "#8a4f2b", softness=0.012),
+        Paint(_grain, "#d29a5e", softness=1.2, strength=0.25),
+        Paint(grown(0.006, *balls), "#a5673a", softness=0.010),
         Paint(grown(0.006, *beret), "#d8373f", softness=0.010),
         *paints(face, in_front(0.03), white=None),
     )
