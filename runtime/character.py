@@ -73,6 +73,6 @@ class Character:
 
     def in_file_coordinates(self, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
         """Take deformed welded vertices (N, 3) back to file vertices (M, 3) in the file's frame."""
-        to_file: NDArray[np.float64] = np.linalg.inv(self.placement)
+        to_file = np.asarray(np.linalg.inv(self.placement), dtype=np.float64)
         placed: NDArray[np.float64] = vertices[self.surface.vertex] @ to_file[:3, :3].T
         return placed + to_file[:3, 3]

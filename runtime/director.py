@@ -71,7 +71,7 @@ class Director:
         self._choices = choices
         self._by_hand = by_hand
         self._targets = [TargetHierarchy(puppet.tree, puppet.root) for puppet in puppets]
-        self._shown = [MatchHysteresis() for _ in puppets]
+        self._shown = [MatchHysteresis(choices.rank - 1) for _ in puppets]
         self._source = simplify(performer.rest_tree())
         self._since = float("nan")
 
@@ -110,18 +110,12 @@ class Director:
                         f"{puppet.character.name} has {len(ranked)} matches with this part of the "
                         f"performer, so there is no --match {self._choices.rank}"
                     )
-                mapping = self._mapping(self._shown_of(shown, ranked, time))
+                match = shown.update(ranked, time)
+                assert match is not None  # there was one to show
+                mapping = self._mapping(match)
             changed = changed or mapping.drives != puppet.mapping.drives
             puppet.show(mapping)
         return changed
-
-    def _shown_of(self, shown: MatchHysteresis, ranked: list[Match], time: float) -> Match:
-        first = shown.shown is None
-        match = shown.update(ranked, time)
-        for _ in range(self._choices.rank - 1 if first else 0):
-            match = shown.next()
-        assert match is not None
-        return match
 
     def _mapping(self, match: Match) -> Mapping:
         chosen = match if self._choices.extend else match.stopped()
@@ -151,9 +145,9 @@ class Director:
     def next_match(self) -> None:
         """Show the match after the one shown, and stay there."""
         for shown in self._shown:
-            shown.next()
+            shown.cycle(1)
 
     def previous_match(self) -> None:
         """Show the match before the one shown, and stay there."""
         for shown in self._shown:
-            shown.previous()
+            shown.cycle(-1)

@@ -29,5 +29,5 @@ def bench(options: argparse.Namespace) -> int:
 
 
 def _write(path: Path, figures: dict[str, Any]) -> None:
-    with whole_file(path) as file:
-        file.write(json.dumps(figures, indent=2).encode())
+    with whole_file(path) as partial:
+        partial.write_text(json.dumps(figures, indent=2) + "\n", encoding="utf-8")
