@@ -189,5 +189,5 @@ def _skeleton() -> tuple[Limb, ...]:
         flip = np.array([side, 1, 1])
         leg = curve([*_LEG, (0.262, 0.05, 0.10)], 6) * flip
         arm = curve(_ARM, 5) * flip
-        limbs += [Limb(f"{name}_leg", leg, "spine0"), Limb(f"{name}_arm", arm, "spine2")]
+        limbs += [Limb(f"{name}_leg", leg, "spine0"), Limb(f"{name}_arm", arm, "spine3")]
     return tuple(limbs)
