@@ -16,22 +16,10 @@ from runtime.puppet import Motion, Puppet
 from runtime.render.camera import front_camera
 from runtime.render.inset import SkeletonInset
 from runtime.render.stage import Stage
+from runtime.render.tubes import PAIR_COLOURS
 
 GAP = 0.18  # metres of floor between two characters
 ROOM = 0.12  # share of its size that a character may move beyond its rest pose and stay in view
-
-CHAIN_COLOURS = np.array(  # linear RGB, told apart also by those who see fewer colours
-    [
-        [1.00, 0.32, 0.05],
-        [0.05, 0.42, 1.00],
-        [0.98, 0.75, 0.05],
-        [0.10, 0.75, 0.30],
-        [0.85, 0.12, 0.60],
-        [0.10, 0.75, 0.85],
-        [0.60, 0.35, 1.00],
-        [0.75, 0.75, 0.75],
-    ]
-)
 
 
 class Theatre:
@@ -116,7 +104,7 @@ def _side_by_side(characters: Sequence[Character]) -> list[float]:
 
 
 def _colours(count: int) -> list[NDArray[np.float64]]:
-    return [CHAIN_COLOURS[index % len(CHAIN_COLOURS)] for index in range(count)]
+    return [PAIR_COLOURS[index % len(PAIR_COLOURS)] for index in range(count)]
 
 
 def _joint_colours(joints: int, mapping: Mapping) -> NDArray[np.float64]:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,13 +26,13 @@ from runtime.output.export import open_export
 from runtime.output.frames import Frames
 from runtime.output.output import Output
 from runtime.output.point_cache import PointCache
-from runtime.output.report import MatchedPair, Part, Report
+from runtime.output.report import MatchedPair, Report
 from runtime.output.video import Video
 from runtime.performer import Performer
 from runtime.progress import Progress
 from runtime.puppet import Puppet
 from runtime.render.camera import front_camera
-from runtime.render.context import headless_context
+from runtime.render.context import headless_context, release_headless
 from runtime.theatre import Theatre
 from runtime.window import Window
 
@@ -92,155 +91,137 @@ def _played(recording: Recording, options: argparse.Namespace) -> _Source:
 def _show(options: argparse.Namespace, source: _Source) -> int:
     """Open everything, run the loop to the end, close everything, whatever happens."""
     with ExitStack() as closing:
-        stream = closing.enter_context(source.stream)
-        performer = Performer(stream.skeleton, options.source)
-        characters = [character_named(name) for name in options.character]
-        report = closing.enter_context(Report(options.report))
-        parts = [report.cast(character) for character in characters]
-        puppets = [Puppet(one, iterations=options.iterations) for one in characters]
-        outputs = _outputs(options, puppets, parts, source.rate, closing)
-        recorder = None
-        if options.record is not None:
-            recorder = closing.enter_context(McapWriter(options.record, stream.skeleton))
-        window = None
-        if not options.headless:
-            window = closing.enter_context(Window("Bunraku", options.size))
-        theatre = _theatre(options, puppets, stream, outputs, window)
-        if theatre is not None:
-            closing.callback(theatre.close)
-        director = _director(options, performer, puppets, theatre, source)
-        loop = FrameLoop(
-            stream,
-            performer,
-            puppets,
-            director=director,
-            report=report,
-            theatre=theatre,
-            outputs=outputs,
-            recorder=recorder,
-            shown=window is not None,
-        )
-        controls = None
-        if window is not None and theatre is not None:
-            controls = Controls(window, theatre, director, stream)
-        total = None if source.recording is None or options.loop else len(source.recording)
-        closing.callback(_tell, report, parts, puppets, performer, loop, source.recording)
-        progress = closing.enter_context(Progress("performing", total))
-        _run(loop, stream, controls, progress, pace=None if options.fast else TICKS)
+        _Show(options, source, closing).run()
     return 0
 
 
-def _run(
-    loop: FrameLoop,
-    stream: SkeletonStream,
-    controls: Controls | None,
-    progress: Progress,
-    *,
-    pace: float | None,
-) -> None:
-    """Tick until the stream ends or the window is closed, `pace` times a second."""
-    ticker = None if pace is None else Ticker(pace)
-    while not stream.ended and not (controls is not None and controls.leaving):
-        if loop.tick():
-            progress.advance()
-        if controls is not None:
-            controls.present()
-            controls.serve()
-        if ticker is not None:
-            ticker.wait()
+class _Show:
+    """One show as the command line asked for it; what it opens is left to `closing`."""
 
+    def __init__(self, options: argparse.Namespace, source: _Source, closing: ExitStack) -> None:
+        self._options = options
+        self._source = source
+        self._closing = closing
+        self._stream = closing.enter_context(source.stream)
+        self._performer = Performer(self._stream.skeleton, options.source)
+        characters = [character_named(name) for name in options.character]
+        self._report = closing.enter_context(Report(options.report))
+        self._parts = [self._report.cast(character) for character in characters]
+        self._puppets = [Puppet(one, iterations=options.iterations) for one in characters]
+        self._outputs = self._open_outputs()
+        self._window = None
+        if not options.headless:
+            self._window = closing.enter_context(Window("Bunraku", options.size))
+        self._theatre = self._open_theatre()
+        self._director = self._call_director()
 
-def _director(
-    options: argparse.Namespace,
-    performer: Performer,
-    puppets: Sequence[Puppet],
-    theatre: Theatre | None,
-    source: _Source,
-) -> Director:
-    by_hand: list[Mapping | None] = [
-        None
-        if options.mapping is None
-        else read_mapping(options.mapping, performer.skeleton, puppet.character.skeleton)
-        for puppet in puppets
-    ]
-    front = front_camera()
-    return Director(
-        performer,
-        puppets,
-        lambda: (front if theatre is None else theatre.camera).view_rotation,
-        Choices(options.match, options.chains == "extend", options.flip, source.patience),
-        by_hand,
-    )
-
-
-def _tell(
-    report: Report,
-    parts: Sequence[Part],
-    puppets: Sequence[Puppet],
-    performer: Performer,
-    loop: FrameLoop,
-    recording: Recording | None,
-) -> None:
-    """Put what is only known at the end into the report."""
-    names = performer.skeleton.names
-    if recording is None:
-        report.recorded(
-            frames=loop.frames + report.dropped, joints=len(names), seconds=loop.seconds
+    def run(self) -> None:
+        """Perform until the stream ends or the window is closed."""
+        loop = FrameLoop(
+            self._stream,
+            self._performer,
+            self._puppets,
+            director=self._director,
+            report=self._report,
+            theatre=self._theatre,
+            outputs=self._outputs,
+            recorder=self._open_recorder(),
+            shown=self._window is not None,
         )
-    else:
-        report.recorded(frames=len(recording), joints=len(names), seconds=recording.seconds)
-    for part, puppet in zip(parts, puppets, strict=True):
-        pairs = [
-            MatchedPair(tuple(names[joint] for joint in drive.source), drive.target)
-            for drive in puppet.mapping.drives
+        self._closing.callback(self._tell, loop)
+        recording = self._source.recording
+        total = None if recording is None or self._options.loop else len(recording)
+        progress = self._closing.enter_context(Progress("performing", total))
+        controls = None
+        if self._window is not None and self._theatre is not None:
+            controls = Controls(self._window, self._theatre, self._director, self._stream)
+        ticker = None if self._options.fast else Ticker(TICKS)
+        while not self._stream.ended and not (controls is not None and controls.leaving):
+            if loop.tick():
+                progress.advance()
+            if controls is not None:
+                controls.present()
+                controls.serve()
+            if ticker is not None:
+                ticker.wait()
+
+    def _open_recorder(self) -> McapWriter | None:
+        if self._options.record is None:
+            return None
+        return self._closing.enter_context(McapWriter(self._options.record, self._stream.skeleton))
+
+    def _open_outputs(self) -> list[list[Output]]:
+        """What keeps each puppet's performance; the pictures of all go with the first."""
+        options, rate = self._options, self._source.rate
+        outputs: list[list[Output]] = []
+        alone = len(self._puppets) == 1
+        for puppet, part in zip(self._puppets, self._parts, strict=True):
+            character = puppet.character
+            kept: list[Output] = [part]
+            if options.cache is not None:
+                path = options.cache if alone else _of(options.cache, character.name)
+                kept.append(self._closing.enter_context(PointCache(path, character)))
+            if options.export is not None:
+                path = options.export if alone else _of(options.export, character.name)
+                kept.append(self._closing.enter_context(open_export(path, character, rate=rate)))
+            outputs.append(kept)
+        if options.video is not None:
+            outputs[0].append(self._closing.enter_context(Video(options.video, rate=rate)))
+        if options.frames is not None:
+            outputs[0].append(self._closing.enter_context(Frames(options.frames)))
+        return outputs
+
+    def _open_theatre(self) -> Theatre | None:
+        """The house, if anybody looks."""
+        if self._window is not None:
+            context, size = self._window.context, self._window.size
+        elif any(output.needs_picture for kept in self._outputs for output in kept):
+            context, size = headless_context(), self._options.size
+            self._closing.callback(release_headless, context)
+        else:
+            return None
+        theatre = Theatre(
+            context,
+            size,
+            self._puppets,
+            self._stream.skeleton,
+            transparent=self._options.transparent,
+        )
+        self._closing.callback(theatre.close)
+        return theatre
+
+    def _call_director(self) -> Director:
+        options = self._options
+        theatre, front = self._theatre, front_camera()
+        by_hand: list[Mapping | None] = [
+            None
+            if options.mapping is None
+            else read_mapping(options.mapping, self._performer.skeleton, one.character.skeleton)
+            for one in self._puppets
         ]
-        part.matched(puppet.mapping.score, pairs)
+        return Director(
+            self._performer,
+            self._puppets,
+            lambda: (front if theatre is None else theatre.camera).view_rotation,
+            Choices(options.match, options.chains == "extend", options.flip, self._source.patience),
+            by_hand,
+        )
 
-
-def _theatre(
-    options: argparse.Namespace,
-    puppets: Sequence[Puppet],
-    stream: SkeletonStream,
-    outputs: Sequence[Sequence[Output]],
-    window: Window | None,
-) -> Theatre | None:
-    """The house, if anybody looks."""
-    if window is None and not any(output.needs_picture for kept in outputs for output in kept):
-        return None
-    return Theatre(
-        headless_context() if window is None else window.context,
-        options.size if window is None else window.size,
-        puppets,
-        stream.skeleton,
-        transparent=options.transparent,
-    )
-
-
-def _outputs(
-    options: argparse.Namespace,
-    puppets: Sequence[Puppet],
-    parts: Sequence[Part],
-    rate: float,
-    closing: ExitStack,
-) -> list[list[Output]]:
-    """What keeps each puppet's performance; the pictures of all go with the first."""
-    outputs: list[list[Output]] = []
-    alone = len(puppets) == 1
-    for puppet, part in zip(puppets, parts, strict=True):
-        character = puppet.character
-        kept: list[Output] = [part]
-        if options.cache is not None:
-            path = options.cache if alone else _of(options.cache, character.name)
-            kept.append(closing.enter_context(PointCache(path, character)))
-        if options.export is not None:
-            path = options.export if alone else _of(options.export, character.name)
-            kept.append(closing.enter_context(open_export(path, character, rate=rate)))
-        outputs.append(kept)
-    if options.video is not None:
-        outputs[0].append(closing.enter_context(Video(options.video, rate=rate)))
-    if options.frames is not None:
-        outputs[0].append(closing.enter_context(Frames(options.frames)))
-    return outputs
+    def _tell(self, loop: FrameLoop) -> None:
+        """Put what is only known at the end into the report."""
+        names = self._performer.skeleton.names
+        recording = self._source.recording
+        if recording is None:
+            frames, seconds = loop.frames + self._report.dropped, loop.seconds
+        else:
+            frames, seconds = len(recording), recording.seconds
+        self._report.recorded(frames=frames, joints=len(names), seconds=seconds)
+        for part, puppet in zip(self._parts, self._puppets, strict=True):
+            pairs = [
+                MatchedPair(tuple(names[joint] for joint in drive.source), drive.target)
+                for drive in puppet.mapping.drives
+            ]
+            part.matched(puppet.mapping.score, pairs)
 
 
 def _of(path: Path, name: str) -> Path:

@@ -1,0 +1,63 @@
+"""How long a whole replay tick takes without the raster, stage by stage."""
+
+from __future__ import annotations
+
+from replay.builtin import builtin_recording
+from replay.player import EveryFrame, Player
+from runtime.characters.builtin import BUILTIN, builtin_character
+from runtime.director import Choices, Director
+from runtime.loop import FrameLoop
+from runtime.output.report import Report
+from runtime.performer import Performer
+from runtime.puppet import Puppet
+from runtime.render.camera import front_camera
+
+BUDGET_MS = {"p50": 4.0, "p99": 8.0}
+ITERATIONS = (1, 2, 3)
+
+
+def run() -> dict[str, object]:
+    """Replay the built-in show on each built-in character; print and return the stage times [ms].
+
+    The first pass over the recording warms caches up and is not counted.
+    """
+    print(f"tick: budget {BUDGET_MS['p50']} ms median, {BUDGET_MS['p99']} ms p99, 10k vertices")
+    print(
+        f"{'character':>10} {'vertices':>8} {'iters':>5} {'frame p50':>10} {'p99':>7} {'deform':>7}"
+    )
+    figures: dict[str, object] = {}
+    for name in BUILTIN:
+        for iterations in ITERATIONS:
+            stages = _replay(name, iterations)
+            vertices = len(builtin_character(name).vertices)
+            frame, deform = stages["frame"], stages["deform"]
+            print(
+                f"{name:>10} {vertices:>8} {iterations:>5} {frame['p50']:>10.2f}"
+                f" {frame['p99']:>7.2f} {deform['p50']:>7.2f}"
+            )
+            figures[f"{name}, {iterations} iterations"] = stages
+    return {"budget_ms": BUDGET_MS, "stages_ms": figures}
+
+
+def _replay(name: str, iterations: int) -> dict[str, dict[str, float]]:
+    recording = builtin_recording()
+    performer = Performer(recording.skeleton)
+    puppet = Puppet(builtin_character(name), iterations=iterations)
+    camera = front_camera()
+    director = Director(performer, [puppet], lambda: camera.view_rotation, Choices(), [None])
+    report = Report(None)
+    for _ in range(2):
+        report = Report(None)
+        player = Player(recording, EveryFrame())
+        loop = FrameLoop(
+            player,
+            performer,
+            [puppet],
+            director=director,
+            report=report,
+            theatre=None,
+            outputs=[[report.cast(puppet.character)]],
+        )
+        while not player.ended:
+            loop.tick()
+    return report.times.summary()
