@@ -1,0 +1,91 @@
+"""Skeletons that were extracted before, kept in the user's cache folder by what they came from."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import sys
+import tempfile
+import zipfile
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+Tree = tuple[NDArray[np.int64], NDArray[np.float64]]  # parents (K,), positions (K, 3)
+Extract = Callable[[NDArray[np.float64], NDArray[np.int64]], Tree]
+
+MOST_NODES = 10_000
+
+
+def cached_skeleton(
+    vertices: NDArray[np.float64], faces: NDArray[np.int64], extract: Extract, version: int
+) -> Tree:
+    """What `extract(vertices, faces)` gives, from the cache where it was computed before.
+
+    Vertices (N, 3) and faces (F, 3) are hashed bit by bit, together with the version of the
+    extraction. A damaged file is computed anew; a folder that cannot be written is no error.
+    """
+    path = cache_folder() / "skeletons" / f"{_key(vertices, faces, version)}.npz"
+    tree = _stored(path)
+    if tree is None:
+        tree = extract(vertices, faces)
+        with suppress(OSError):
+            _store(path, tree)
+    return tree
+
+
+def cache_folder() -> Path:
+    """The folder for what can be computed again, by the custom of the platform."""
+    home = Path(os.path.expanduser("~"))  # noqa: PTH111  (Path.home raises where there is none)
+    if sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
+    elif sys.platform == "darwin":
+        base = home / "Library" / "Caches"
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache")
+    return base / "bunraku"
+
+
+def _key(vertices: NDArray[np.float64], faces: NDArray[np.int64], version: int) -> str:
+    digest = hashlib.sha256(f"skeleton {version} {vertices.shape} {faces.shape}".encode())
+    digest.update(np.ascontiguousarray(vertices, dtype="<f8").tobytes())
+    digest.update(np.ascontiguousarray(faces, dtype="<i8").tobytes())
+    return digest.hexdigest()
+
+
+def _stored(path: Path) -> Tree | None:
+    """The tree in a file, or None where there is none or it is damaged."""
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            parents = np.asarray(stored["parents"], dtype=np.int64)
+            positions = np.asarray(stored["positions"], dtype=np.float64)
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, NotImplementedError):
+        return None
+    count = len(parents)
+    sound = parents.shape == (count,) and positions.shape == (count, 3) and count <= MOST_NODES
+    if not sound or count == 0 or not np.isfinite(positions).all():
+        return None
+    return (parents, positions) if _is_tree(parents) else None
+
+
+def _is_tree(parents: NDArray[np.int64]) -> bool:
+    """Whether there is one root and every other node's parent comes before it."""
+    return bool(
+        parents[0] == -1 and ((parents >= 0) & (parents < np.arange(len(parents))))[1:].all()
+    )
+
+
+def _store(path: Path, tree: Tree) -> None:
+    """Write beside, then rename: another process never sees half a file."""
+    path.parent.mkdir(parents=True, exist_ok=True)
+    handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            np.savez(file, parents=tree[0], positions=tree[1])
+        Path(name).replace(path)
+    except BaseException:
+        Path(name).unlink(missing_ok=True)
+        raise

@@ -1,0 +1,93 @@
+"""Characters from files: read, welded, put on the stage, with a skeleton in every case."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from devices.errors import InputError
+from devices.skeleton import Skeleton
+from runtime.character import Character, Surface
+from runtime.characters.builtin import BUILTIN
+from runtime.characters.cache import cached_skeleton
+from runtime.characters.mesh_data import FileMesh
+from runtime.characters.mesh_file import MESH_SUFFIXES, read_mesh_file
+from runtime.characters.palette import palette_color
+from runtime.characters.placement import place, placed
+from runtime.characters.weld import first_occurrences, weld
+
+RIG_SUFFIXES = (".glb", ".gltf", ".vrm")
+SUFFIXES = MESH_SUFFIXES + RIG_SUFFIXES
+
+
+def load_character(path: Path) -> Character:
+    """The character in a mesh or rig file, on the stage, with its rig or an extracted skeleton.
+
+    Raises:
+        InputError: there is no such file, its format is not known, or it holds no usable surface.
+    """
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(
+            f"{path}: no character is read from {path.suffix or 'a file without a suffix'}; use "
+            f"{', '.join(SUFFIXES)}, or a built-in one: {', '.join(BUILTIN)}"
+        )
+    if not path.exists():
+        raise InputError(
+            f"{path}: there is no such file; built-in characters are {', '.join(BUILTIN)}"
+        )
+    if path.suffix.lower() in RIG_SUFFIXES:
+        raise InputError(f"{path}: glTF is not read yet; convert it to OBJ")
+    return _from_mesh(path.stem, read_mesh_file(path), path)
+
+
+def _from_mesh(name: str, mesh: FileMesh, path: Path) -> Character:
+    vertex = weld(mesh.vertices)
+    welded = mesh.vertices[first_occurrences(vertex)]
+    faces = vertex[mesh.faces]
+    placement = place(welded, faces)
+    vertices = placed(placement.matrix, welded)
+    return Character(
+        name=name,
+        vertices=vertices,
+        faces=faces,
+        skeleton=_extracted(vertices, faces, path),
+        weights=None,
+        surface=_surface(mesh, vertex),
+        placement=placement.matrix,
+        notes=mesh.notes + placement.notes,
+    )
+
+
+def _extracted(vertices: NDArray[np.float64], faces: NDArray[np.int64], path: Path) -> Skeleton:
+    from solvers.skeletonize import VERSION, extract_skeleton  # noqa: PLC0415  (optional extras)
+
+    try:
+        parents, positions = cached_skeleton(vertices, faces, extract_skeleton, VERSION)
+    except ImportError as error:
+        raise InputError(
+            f"{path}: a skeleton for a mesh without a rig needs the extra ({error.name}): "
+            "pip install 'bunraku[characters]'"
+        ) from None
+    names = tuple(f"node{index}" for index in range(len(parents)))
+    return Skeleton(names, parents, positions)
+
+
+def _surface(mesh: FileMesh, vertex: NDArray[np.int64]) -> Surface:
+    colors = mesh.colors
+    if colors is None:
+        colors = np.ones((len(mesh.vertices), 4), dtype=np.float32)
+        if all(m.texture is None and (m.color == 1.0).all() for m in mesh.materials):
+            colors[:] = palette_color(mesh.vertices, mesh.faces)
+    face_material = mesh.face_material
+    if face_material is None:
+        face_material = np.zeros(len(mesh.faces), dtype=np.int64)
+    return Surface(
+        vertex=vertex,
+        faces=mesh.faces.astype(np.int32),
+        colors=colors,
+        uvs=mesh.uvs,
+        materials=mesh.materials,
+        face_material=face_material,
+    )
