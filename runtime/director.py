@@ -15,16 +15,18 @@ from numpy.typing import NDArray
 from devices.errors import InputError
 from devices.skeleton import SkeletonFrame
 from runtime.mapping import Drive, Mapping
-from runtime.performer import Performer, Pose
-from runtime.puppet import Puppet, body_of
+from runtime.performer import Performer, Pose, Rest, rest_state
+from runtime.puppet import STRAIGHT_ON, Body, Puppet, body_of
 from solvers.abstraction import simplify
 from solvers.match_hysteresis import MatchHysteresis
 from solvers.matching import SIZE_PREFERENCE, Match, TargetHierarchy
+from solvers.posture import likeness
 
 LEAST_SEEN = 0.5  # share of the driving joints that must be in view to strike a pose
 CANDIDATES = 20  # matches that can be cycled through
 
-View = Callable[[], NDArray[np.float64]]
+Array = NDArray[np.float64]
+View = Callable[[], Array]
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,47 +77,63 @@ class Director:
         self._source = simplify(performer.rest_tree())
         self._since = float("nan")
 
-    def direct(self, frame: SkeletonFrame) -> None:
-        """While matching, show the best match of this frame's pose; accept it in time.
+    def sees(self, frame: SkeletonFrame) -> bool:
+        """Whether enough of the driving joints are in view to strike a pose."""
+        return bool(np.mean(frame.confidence[self._performer.joints] > 0.0) >= LEAST_SEEN)
 
-        A pose counts only with at least half of the driving joints in view.
+    def rehearse(self, poses: Sequence[Pose]) -> None:
+        """Let each puppet perform from the one of these poses that is most like it.
+
+        A recorded performer cannot be asked to strike a pose, so the recording is looked through
+        for one: its match is taken, and it is the rest state. The performer is seen facing the
+        stage, whichever way the body had turned.
         """
+        view = self._view()
+        states = [rest_state(pose, heading=0.0) for pose in poses]
+        for number, puppet in enumerate(self._puppets):
+            choices = [(self._choose(number, state.positions, 0.0), state) for state in states]
+            worths = [_worth(puppet, mapping, state, view) for mapping, state in choices]
+            mapping, rest = choices[int(np.argmax(worths))]
+            puppet.take(mapping, rest, view, self._body(puppet, mapping, rest))
+        self.matching = False
+
+    def direct(self, frame: SkeletonFrame) -> None:
+        """While matching, show the best match of the newest pose; accept it in time."""
         pose = self._performer.pose
-        seen = np.mean(frame.confidence[self._performer.joints] > 0.0)
-        if not self.matching or pose is None or seen < LEAST_SEEN:
+        if not self.matching or pose is None or not self.sees(frame):
             return
-        changed = self._match(pose, frame.time)
+        changed = False
+        for number, puppet in enumerate(self._puppets):
+            mapping = self._choose(number, pose.seen, frame.time)
+            changed = changed or mapping.drives != puppet.mapping.drives
+            puppet.show(mapping)
         if changed or np.isnan(self._since):
             self._since = frame.time
         if frame.time - self._since >= self._choices.patience:
             self.accept()
 
-    def _match(self, pose: Pose, time: float) -> bool:
-        changed = False
-        positions = pose.seen[self._performer.joints]
-        for puppet, target, shown, by_hand in zip(
-            self._puppets, self._targets, self._shown, self._by_hand, strict=True
-        ):
-            mapping = by_hand
-            if mapping is None:
-                ranked = target.rank(
-                    self._source,
-                    self._view(),
-                    positions,
-                    limit=CANDIDATES + self._choices.rank,
-                    size_preference=SIZE_PREFERENCE,
-                )
-                if len(ranked) < self._choices.rank:
-                    raise InputError(
-                        f"{puppet.character.name} has {len(ranked)} matches with this part of the "
-                        f"performer, so there is no --match {self._choices.rank}"
-                    )
-                match = shown.update(ranked, time)
-                assert match is not None  # there was one to show
-                mapping = self._mapping(match)
-            changed = changed or mapping.drives != puppet.mapping.drives
-            puppet.show(mapping)
-        return changed
+    def _choose(self, number: int, positions: Array, time: float) -> Mapping:
+        """The mapping of one puppet for a pose (J, 3) [m]: by hand, or by the match shown."""
+        by_hand = self._by_hand[number]
+        if by_hand is not None:
+            return by_hand
+        ranked = self._targets[number].rank(
+            self._source,
+            self._view(),
+            positions[self._performer.joints],
+            limit=CANDIDATES + self._choices.rank,
+            size_preference=SIZE_PREFERENCE,
+        )
+        match = self._shown[number].update(ranked, time)
+        if len(ranked) < self._choices.rank or match is None:
+            raise InputError(
+                f"{self._puppets[number].character.name} has {len(ranked)} matches with this part "
+                f"of the performer, so there is no --match {self._choices.rank}"
+            )
+        return self._mapping(match)
+
+    def _body(self, puppet: Puppet, mapping: Mapping, rest: Rest) -> Body:
+        return body_of(mapping, self._performer.legs, rest.positions, puppet.tree.positions)
 
     def _mapping(self, match: Match) -> Mapping:
         chosen = match if self._choices.extend else match.stopped()
@@ -129,9 +147,12 @@ class Director:
 
     def accept(self) -> None:
         """Let the matches shown perform from now on; the pose just struck is the rest state."""
-        rest = self._performer.rest()
+        pose = self._performer.pose
+        if pose is None or any(not puppet.mapping.drives for puppet in self._puppets):
+            return
+        rest = rest_state(pose)
         for puppet in self._puppets:
-            body = body_of(puppet.mapping, self._performer.legs, rest, puppet.tree.positions)
+            body = self._body(puppet, puppet.mapping, rest)
             puppet.take(puppet.mapping, rest, self._view(), body)
         self.matching = False
 
@@ -151,3 +172,17 @@ class Director:
         """Show the match before the one shown, and stay there."""
         for shown in self._shown:
             shown.cycle(-1)
+
+
+def _worth(puppet: Puppet, mapping: Mapping, rest: Rest, view: Array) -> float:
+    """How well a rest state suits: the match's own score, and how alike the limbs' shapes are."""
+    shapes = sum(
+        likeness(
+            rest.positions[list(drive.source)],
+            puppet.tree.positions[list(drive.target)],
+            STRAIGHT_ON,
+            view,
+        )
+        for drive in mapping.drives
+    )
+    return shapes + (mapping.score if np.isfinite(mapping.score) else 0.0)

@@ -113,9 +113,8 @@ class FrameLoop:
         timer = self._timer
         if leads:
             with timer.stage("match"):
-                self._performer.follow(frame)
+                self._pose = self._performer.follow(frame)
                 self._director.direct(frame)
-                self._pose = self._performer.pose
         motions = []
         for puppet in self._puppets:
             with timer.stage("retarget"):

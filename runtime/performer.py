@@ -7,9 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.anatomy import available_presets, heading_joints, source_joints, source_tree
+from devices.anatomy import (
+    available_presets,
+    heading_joints,
+    hips_joint,
+    source_joints,
+    source_tree,
+)
 from devices.skeleton import Skeleton, SkeletonFrame
-from replay.fill import FilledFrame, Filler
+from replay.fill import Filler
 from solvers.heading import heading, turned
 from solvers.tree import Tree
 
@@ -21,19 +27,42 @@ class Pose:
     """What a performer does at one moment.
 
     Attributes:
-        positions: (J, 3) [m] every joint, with the turn of the whole body since the rest state
-            taken out; never NaN.
-        seen: (J, 3) [m] every joint where the performer really is; never NaN.
+        seen: (J, 3) [m] every joint, never NaN.
         filled: (J,) bool, joints that were not seen but filled in.
-        turn: [rad] about +Y, the turn that was taken out.
-        lift: [m] how much higher the root is than in the rest state.
+        heading: [rad] about +Y, how far the whole body has turned from facing +Z.
+        hips: (3,) [m] where the hips are; the body turns about them.
+    """
+
+    seen: Array
+    filled: NDArray[np.bool_]
+    heading: float
+    hips: Array
+
+    def facing(self, heading: float) -> Array:
+        """Every joint (J, 3) [m], the whole body turned so that it has this heading [rad]."""
+        return turned(self.seen, heading - self.heading, self.hips)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rest:
+    """The rest state: what the performer does while the character stands as it was made.
+
+    Attributes:
+        positions: (J, 3) [m] every joint.
+        heading: [rad] the heading of that pose.
+        height: [m] of the hips above the lowest joint, as one stands.
     """
 
     positions: Array
-    seen: Array
-    filled: NDArray[np.bool_]
-    turn: float
-    lift: float
+    heading: float
+    height: float
+
+
+def rest_state(pose: Pose, heading: float | None = None) -> Rest:
+    """Make a pose the rest state, seen under `heading` [rad], under its own if that is None."""
+    under = pose.heading if heading is None else heading
+    height = float(pose.hips[1] - pose.seen[:, 1].min())
+    return Rest(pose.facing(under), under, height)
 
 
 class Performer:
@@ -43,6 +72,7 @@ class Performer:
         skeleton: the performer's whole skeleton.
         joints: the joints that may drive a character, as chosen by `source`.
         legs: the joints of each leg, empty for a performer without any.
+        pose: the newest pose; None before the first frame.
 
     Raises:
         InputError: `source` names a part or joints that this skeleton does not have.
@@ -58,40 +88,18 @@ class Performer:
             if leg in there
         ]
         self._pairs = np.array(heading_joints(skeleton), dtype=np.int64).reshape(-1, 2)
+        self._hips = hips_joint(skeleton)
         self._filler = Filler(skeleton)
         self._heading = 0.0
-        self._rest_heading = 0.0
-        self._rest_height = 0.0
-        self._filled: FilledFrame | None = None
+        self.pose: Pose | None = None
 
-    def follow(self, frame: SkeletonFrame) -> None:
-        """Take in one frame."""
-        self._filled = self._filler.fill(frame)
-        self._heading = heading(self._filled.positions, self._pairs, self._heading)
-
-    @property
-    def pose(self) -> Pose | None:
-        """The newest pose as seen from the rest state; None before the first frame."""
-        if self._filled is None:
-            return None
-        positions = self._filled.positions
-        turn = self._heading - self._rest_heading
-        root = positions[self.skeleton.root]
-        return Pose(
-            positions=turned(positions, -turn, root),
-            seen=positions,
-            filled=self._filled.filled,
-            turn=turn,
-            lift=float(root[1]) - self._rest_height,
-        )
-
-    def rest(self) -> Array:
-        """Make the newest pose the rest state and return its positions (J, 3) [m]."""
-        if self._filled is None:
-            raise RuntimeError("no frame has been followed yet")
-        self._rest_heading = self._heading
-        self._rest_height = float(self._filled.positions[self.skeleton.root, 1])
-        return self._filled.positions
+    def follow(self, frame: SkeletonFrame) -> Pose:
+        """Take in one frame; its pose is the newest."""
+        filled = self._filler.fill(frame)
+        positions = filled.positions
+        self._heading = heading(positions, self._pairs, self._heading)
+        self.pose = Pose(positions, filled.filled, self._heading, positions[self._hips])
+        return self.pose
 
     def rest_tree(self) -> Tree:
         """The chosen joints as a tree, standing as the skeleton does at rest."""

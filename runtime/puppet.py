@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from devices.errors import InputError
 from runtime.character import Character
 from runtime.mapping import Drive, Mapping
-from runtime.performer import Pose
+from runtime.performer import Pose, Rest
 from solvers.abstraction import abstract
 from solvers.arap import ArapSolver
 from solvers.binding import bind
@@ -91,14 +91,15 @@ class Puppet:
         )
         self.mapping = Mapping(())
         self._retargets: list[tuple[list[int], ChainRetarget]] = []
+        self._source_rest: Rest | None = None
         self.rest()
 
-    def take(self, mapping: Mapping, source_rest: Array, view: Array, body: Body) -> None:
+    def take(self, mapping: Mapping, rest: Rest, view: Array, body: Body) -> None:
         """Be driven as `mapping` says from now on; the performer's rest state meets its own.
 
         Args:
             mapping: which joints drive which nodes.
-            source_rest: (J, 3) [m] the performer's rest state.
+            rest: the performer's rest state.
             view: (3, 3) rotation from the stage to the camera.
             body: how far it goes along with the whole performer.
 
@@ -125,7 +126,7 @@ class Puppet:
             (
                 list(drive.source),
                 ChainRetarget(
-                    source_rest[list(drive.source)],
+                    rest.positions[list(drive.source)],
                     self.tree.positions[list(drive.target)],
                     STRAIGHT_ON,
                     view,
@@ -135,6 +136,7 @@ class Puppet:
             for drive in mapping.drives
         ]
         self.mapping = mapping
+        self._source_rest = rest
         self._body = body
 
     def _drive(self, chains: tuple[tuple[int, ...], ...], root: int) -> None:
@@ -157,21 +159,22 @@ class Puppet:
         """Be driven by nothing and stand at rest."""
         self._drive((), self.root)
         self._body = Body()
-        self.follow_rest()
+        self._source_rest = None
+        self._pose_nodes([])
+        self._turn = self._lift = 0.0
+        self._shift = np.zeros(3)
 
     def follow(self, pose: Pose) -> None:
         """Take over the performer's pose."""
+        if self._source_rest is None:
+            return
+        rest = self._source_rest
+        joints = pose.facing(rest.heading)
         self._pose_nodes(
-            [retarget.rotations(pose.positions[source]) for source, retarget in self._retargets]
+            [retarget.rotations(joints[source]) for source, retarget in self._retargets]
         )
-        self._turn = pose.turn if self._body.turns else 0.0
-        self._lift = self._body.lift * pose.lift
-
-    def follow_rest(self) -> None:
-        """Return to the rest pose."""
-        self._pose_nodes([_IDENTITY[np.zeros(len(chain) - 1, dtype=int)] for chain in self._chains])
-        self._turn = self._lift = 0.0
-        self._shift = np.zeros(3)
+        self._turn = pose.heading - rest.heading if self._body.turns else 0.0
+        self._lift = self._body.lift * float(pose.hips[1] - rest.height)
 
     def _pose_nodes(self, turns: list[Array]) -> None:
         self._rotations, self._positions = self._skeleton_pose.pose(turns)
@@ -218,9 +221,6 @@ class Puppet:
         """Where the nodes of each chain of the mapping are, (k, 3) [m] each."""
         nodes = self._on_stage(self._positions)
         return [nodes[list(drive.target)] for drive in self.mapping.drives]
-
-
-_IDENTITY = np.array([[0.0, 0.0, 0.0, 1.0]])
 
 
 def _bones_of_weights(character: Character, parents: Indices) -> Indices | None:

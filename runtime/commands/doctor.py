@@ -18,7 +18,7 @@ from runtime.characters.cache import cache_folder
 from runtime.director import Choices, Director
 from runtime.loop import FrameLoop
 from runtime.output.report import Report
-from runtime.output.video_file import encoders
+from runtime.output.video import encoder_for
 from runtime.performer import Performer
 from runtime.puppet import Puppet
 from runtime.render.context import headless_context, is_software, release_headless, renderer_name
@@ -84,10 +84,7 @@ def _cache() -> str:
 
 
 def _video() -> str:
-    names = encoders()
-    if not names:
-        raise InputError("PyAV has no H.264 encoder: pip install --force-reinstall av")
-    return ", ".join(names)
+    return encoder_for(Path("out.mp4"))
 
 
 CHECKS: dict[str, Check] = {

@@ -31,6 +31,7 @@ from runtime.output.video import Video
 from runtime.performer import Performer
 from runtime.progress import Progress
 from runtime.puppet import Puppet
+from runtime.rehearsal import rehearse
 from runtime.render.camera import front_camera
 from runtime.render.context import headless_context, release_headless
 from runtime.theatre import Theatre
@@ -130,6 +131,8 @@ class _Show:
         )
         self._closing.callback(self._tell, loop)
         recording = self._source.recording
+        if recording is not None:
+            rehearse(recording, self._options.source, self._director)
         total = None if recording is None or self._options.loop else len(recording)
         progress = self._closing.enter_context(Progress("performing", total))
         controls = None

@@ -169,6 +169,16 @@ class Video:
         self.close()
 
 
+def encoder_for(path: Path) -> str:
+    """The encoder that a video at `path` would be written with.
+
+    Raises:
+        InputError: another suffix, or PyAV or an encoder is missing.
+    """
+    encoders = _ENCODERS[check_suffix(path, tuple(_ENCODERS))]
+    return _first_available(_import_av(path), encoders, path)[0]
+
+
 def _import_av(path: Path) -> Any:
     try:
         import av  # noqa: PLC0415
