@@ -72,7 +72,7 @@ def make_tentacle() -> Character:
             vertex=vertex,
             faces=split.astype(np.int32),
             colors=colors,
-            uvs=np.tile(np.float32([0.25, 0.25]), (len(vertex), 1)),
+            uvs=np.tile(np.float32([0.25, 0.125]), (len(vertex), 1)),
             materials=(
                 Material(np.float32([0.5, 1.0, 0.25, 1.0])),
                 Material(np.ones(4, np.float32), texture),

@@ -81,7 +81,7 @@ def test_limbs_that_hang_side_by_side_do_not_follow_each_other() -> None:
             rest.append([x, 1 - 0.1 * step, 0])
     names = tuple(f"n{k}" for k in range(len(rest)))
     skeleton = Skeleton(names, np.array(parents), np.array(rest))
-    left_tip = np.array([[-0.06, 0.32, 0.0]])
+    left_tip = np.array([[-0.004, 0.32, 0.0]])
     skin = skin_of_distances(left_tip, skeleton)
     right = skin.nodes[0] >= 8
     assert skin.weights[0][right].sum() < 0.01

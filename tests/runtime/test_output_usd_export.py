@@ -39,6 +39,8 @@ def test_the_surface_is_exact_in_every_frame(tmp_path: Path, name: str) -> None:
     )[0]
     indices = np.array(mesh.GetFaceVertexIndicesAttr().Get()).reshape(-1, 3)
     np.testing.assert_array_equal(indices, character.surface.faces)
+    st = np.array(UsdGeom.PrimvarsAPI(mesh).GetPrimvar("st").Get())
+    np.testing.assert_allclose(st, character.surface.uvs * (1, -1) + (0, 1))  # v points up
     points = mesh.GetPointsAttr()
     seconds = np.array(points.GetTimeSamples()) / stage.GetTimeCodesPerSecond()
     np.testing.assert_allclose(seconds, [frame.time for frame in show], atol=1e-6)
