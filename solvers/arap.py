@@ -16,7 +16,6 @@ from __future__ import annotations
 
 import math
 
-import cholespy
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike
@@ -32,6 +31,7 @@ from solvers.arap_layout import (
     checked_targets,
     lay_out,
 )
+from solvers.block_factor import BlockFactor
 from solvers.handle_motion import (
     Influences,
     farthest_motion,
@@ -78,16 +78,17 @@ class ArapSolver:
         if energy not in (SPOKES, SPOKES_AND_RIMS):
             raise ValueError(f"unknown energy {energy!r}: use {SPOKES!r} or {SPOKES_AND_RIMS!r}")
         self._frame = Frame.around(points)
-        self._layout = layout = lay_out(len(points), triangles, chosen)
+        self._layout = layout = lay_out(points, triangles, chosen)
         self._rest = np.ascontiguousarray(self._frame.inside(points)[layout.order])
         self._mesh = build_cells(self._rest[: layout.active], layout.faces, energy)
-        self._factor = _Factor(self._mesh.laplacian[: layout.free, : layout.free])
+        self._factor = BlockFactor(
+            sp.csr_matrix(self._mesh.laplacian[: layout.free, : layout.free]), layout.tree
+        )
         self._influences = self._find_influences()
         self._carriers = _nearest_groups(self._rest, layout, self._group_of)
         self._R = np.empty((layout.active, 9))
         self._laplace_x = np.empty((layout.active, 3))
         self._residual = np.empty((layout.free, 3))
-        self._correction = np.empty((layout.free, 3))
         self._x = self._rest.copy()
         self._from_rest = np.empty_like(self._rest)
         self._energy_terms = np.empty(len(self._mesh.terms.cells))
@@ -128,8 +129,7 @@ class ArapSolver:
 
     def _global_step(self) -> None:
         residual(self._R, self._laplace_x, self._mesh.cells, self._residual)
-        self._factor.solve(self._residual, self._correction)
-        self._x[: self._layout.free] += self._correction
+        self._factor.add_solution(self._residual, self._x)
 
     def _move_along(self, goals: Floats) -> None:
         """Put the start of this frame's iterations into x: handles at their goals, (H, 3)."""
@@ -159,27 +159,6 @@ class ArapSolver:
         return harmonic_influences(
             self._factor.solve, sp.csr_matrix(coupling), self._group_of, self._group_count
         )
-
-
-class _Factor:
-    """A prefactored symmetric positive definite matrix (n, n)."""
-
-    def __init__(self, matrix: sp.csr_matrix) -> None:
-        matrix = sp.csr_matrix(matrix)
-        self._solver = None
-        if matrix.shape[0]:
-            self._solver = cholespy.CholeskySolverD(
-                matrix.shape[0],
-                matrix.indptr.astype(np.int32),
-                matrix.indices.astype(np.int32),
-                matrix.data,
-                cholespy.MatrixType.CSR,
-            )
-
-    def solve(self, b: Floats, x: Floats) -> None:
-        """Put the solution of A x = b, both (n, 3), into x."""
-        if self._solver is not None:
-            self._solver.solve(b, x)
 
 
 def _nearest_groups(rest: Floats, layout: Layout, group_of: Ints) -> Influences:

@@ -21,7 +21,6 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from solvers.laplacian import (
-    LEAST_WEIGHT,
     Floats,
     Ints,
     WeightedEdges,
@@ -34,6 +33,10 @@ from solvers.laplacian import (
 
 SPOKES = "spokes"
 SPOKES_AND_RIMS = "spokes-and-rims"
+
+# Added to each face's share of an edge. The shares may be negative: a face's energy is not, being
+# that of a finite element. This much makes it positive for any face.
+_LEAST_HALF = 1e-8
 
 
 class Terms(NamedTuple):
@@ -75,7 +78,7 @@ def build_cells(vertices: Floats, faces: Ints, energy: str) -> CellMesh:
     if energy == SPOKES:
         edges = cotangent_edges(vertices, faces)
         return _lay_out(vertices, edges, _spokes(edges), sharing=2)
-    halves = half_cotangents(vertices, faces) + LEAST_WEIGHT
+    halves = half_cotangents(vertices, faces) + _LEAST_HALF
     edges = sum_over_faces(faces, halves, len(vertices))
     return _lay_out(vertices, edges, _spokes_and_rims(faces, halves), sharing=3)
 

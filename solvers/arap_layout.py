@@ -11,9 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import ArrayLike
-from scipy.sparse.csgraph import connected_components, reverse_cuthill_mckee
+from scipy.sparse.csgraph import connected_components
 
 from solvers.laplacian import Floats, Ints
+from solvers.nested_dissection import Dissection, dissect
 
 _FARTHEST = 1e9  # the farthest target, in sizes of the mesh; keeps every square finite
 
@@ -47,7 +48,8 @@ class Layout:
 
     The first `free` are solved for, those up to `active` are the handles, the others carried.
     `faces` (F', 3) are the solver's vertices, without the carried components' faces;
-    `parts` (N,) numbers the component of each of the solver's vertices.
+    `parts` (N,) numbers the component of each of the solver's vertices; `tree` is the dissection of
+    the free ones, whose order they are in.
     """
 
     order: Ints
@@ -55,6 +57,7 @@ class Layout:
     active: int
     faces: Ints
     parts: Ints
+    tree: Dissection
 
 
 def checked_mesh(vertices: ArrayLike, faces: ArrayLike) -> tuple[Floats, Ints]:
@@ -107,8 +110,9 @@ def checked_targets(targets: ArrayLike, count: int, frame: Frame) -> Floats:
     return points
 
 
-def lay_out(count: int, faces: Ints, handles: Ints) -> Layout:
-    """The order in which `count` vertices are worked on."""
+def lay_out(points: Floats, faces: Ints, handles: Ints) -> Layout:
+    """The order in which the vertices at `points` (N, 3) are worked on."""
+    count = len(points)
     tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     graph = sp.coo_matrix((np.ones(len(tails)), (tails, heads)), shape=(count, count)).tocsr()
     graph = sp.csr_matrix(graph + graph.T)
@@ -118,13 +122,14 @@ def lay_out(count: int, faces: Ints, handles: Ints) -> Layout:
     is_free = touched[part_of]
     is_free[handles] = False
     free = np.flatnonzero(is_free)
-    free = free[reverse_cuthill_mckee(graph[free][:, free], symmetric_mode=True)]
+    tree = dissect(sp.csr_matrix(graph[free][:, free]), points[free])
+    free = free[tree.order]
     carried = np.flatnonzero(~touched[part_of])
     order = np.concatenate([free, handles, carried])
     place = np.empty(count, dtype=np.int64)
     place[order] = np.arange(count)
     kept = faces[touched[part_of[faces[:, 0]]]]
-    return Layout(order, len(free), len(free) + len(handles), place[kept], part_of[order])
+    return Layout(order, len(free), len(free) + len(handles), place[kept], part_of[order], tree)
 
 
 def _integers(values: ArrayLike, name: str) -> Ints:

@@ -20,7 +20,8 @@ Ints = NDArray[np.int64]
 _LEAST_FATNESS = 1e-3
 
 # The least weight of an edge. It keeps every connected mesh connected for the solver (an edge
-# between two right angles weighs zero) and is too small to be seen in the answer.
+# between two right angles weighs zero), and is too small to be seen in the answer; it is also large
+# enough that rounding, divided by it, stays below 1e-9.
 LEAST_WEIGHT = 1e-6
 
 

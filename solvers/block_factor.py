@@ -1,0 +1,442 @@
+"""A sparse factor made for many solves with three right-hand sides.
+
+The elimination tree of a nested dissection is factored block by block, as A = L D L^T with dense
+blocks (Duff and Reid 1983, The multifrontal solution of indefinite sparse symmetric linear systems,
+without its pivoting: the matrix is positive definite). Each pivot block is inverted and each block
+of L multiplied by it, so that a solve is one dense product per block on the way up the tree and one
+on the way down. The factor is made in double and kept in single precision, which halves what a
+solve must read; a residual in double precision makes up for it (Carson and Higham 2018,
+Accelerating the solution of linear systems by iterative refinement in three precisions). A matrix
+so badly conditioned that this would not do is kept in double.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any, NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+from numba import prange
+from numpy.typing import NDArray
+
+from solvers.compiled import kernel, parallel_kernel
+from solvers.laplacian import Floats
+from solvers.nested_dissection import Dissection
+
+Indices = NDArray[np.int32]
+Offsets = NDArray[np.int64]
+Singles = NDArray[np.float32]
+
+# Subtrees that are solved at the same time. A fixed number: the answer must not depend on the
+# number of cores.
+TASKS = 4
+WIDTH = 16  # columns of a panel: what the processor multiplies at once, or a multiple
+STEP = 8  # rows of a panel that are added up before their sum is stored
+
+# The share of an error that a solve in single precision may leave.
+_LOST_MOST = 1e-2
+
+
+class Blocks(NamedTuple):
+    """The factor's blocks, children before parents.
+
+    Block b eliminates unknowns firsts[b] to firsts[b + 1], k of them, and touches m later ones,
+    rows[row_starts[b]:row_starts[b + 1]]. With G = L D^-1 (m, k), `ups` holds -G^T (k, m) at
+    up_starts[b]; `downs`, last block first, holds the pivot block's inverse over -G (k + m, k) at
+    down_starts[b + 1]. Both ways are then a row vector times a matrix, read in the order it lies in
+    memory, panel by panel of WIDTH columns; rows are padded with zeros to a multiple of STEP.
+    """
+
+    firsts: Indices
+    row_starts: Offsets
+    rows: Indices
+    up_starts: Offsets
+    ups: Singles
+    down_starts: Offsets
+    downs: Singles
+
+
+class Schedule(NamedTuple):
+    """Which blocks are worked on at the same time.
+
+    Task t is the subtree of blocks task_firsts[t] to task_lasts[t], inclusive; `tops` are the
+    blocks above all tasks. A task may not write what it shares with another: it keeps the updates
+    of the `shared` unknowns of the top blocks in a copy of its own, at n + t * len(shared).
+    """
+
+    task_firsts: Indices
+    task_lasts: Indices
+    tops: Indices
+    shared: Indices
+    tallest: int
+
+
+class BlockFactor:
+    """A factored symmetric positive definite matrix (n, n), given in the order of a dissection."""
+
+    def __init__(self, matrix: sp.csr_matrix, tree: Dissection) -> None:
+        self._factorise(matrix, tree, np.float32)
+        if _lost_share(matrix, self) > _LOST_MOST:
+            self._factorise(matrix, tree, np.float64)
+
+    def add_solution(self, b: Floats, x: Floats) -> None:
+        """Add the solution y of A y = b, both (n, 3), to the first n rows of x."""
+        _add_solution(self._blocks, self._schedule, b, x, self._work)
+
+    def solve(self, b: Floats, x: Floats) -> None:
+        """Put the solution of A x = b, both (n, 3), into x."""
+        x[:] = 0.0
+        self.add_solution(b, x)
+
+    def _factorise(
+        self, matrix: sp.csr_matrix, tree: Dissection, precision: type[np.floating[Any]]
+    ) -> None:
+        starts, columns = matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32)
+        row_starts, rows = _symbolic(starts, columns, tree)
+        k, m = np.diff(tree.firsts).astype(np.int64), np.diff(row_starts)
+        up_starts = np.append(0, np.cumsum(_padded(k, STEP) * _padded(m, WIDTH)))
+        # The way down reads the blocks backwards: let it read memory forwards all the same.
+        down_sizes = _padded(k + m, STEP) * _padded(k, WIDTH)
+        down_starts = np.append(0, np.cumsum(down_sizes[::-1]))[::-1].copy()
+        ups, downs = np.zeros(up_starts[-1], precision), np.zeros(down_starts[0], precision)
+        blocks = Blocks(tree.firsts, row_starts, rows, up_starts, ups, down_starts, downs)
+        _factorise(starts, columns, matrix.data, tree.parents, blocks)
+        self._schedule = _schedule(tree, k * (k + m), int((k + m).max(initial=0)) + STEP)
+        count = len(tree.order)
+        self._blocks = blocks._replace(rows=_private_rows(blocks, self._schedule, count))
+        copies = len(self._schedule.task_firsts) * len(self._schedule.shared)
+        self._work = np.zeros((count + copies, 3), precision)
+
+
+def _lost_share(matrix: sp.csr_matrix, factor: BlockFactor) -> float:
+    """The share of an error, in the matrix's norm, that a solve leaves of it; the worst of a few.
+
+    A step that corrects by this solve descends on the quadratic form as long as the share is below
+    one. Each round starts from what the last one left, which is what the solve is worst at.
+    """
+    error = np.random.default_rng(0).standard_normal((matrix.shape[0], 3))
+    found = np.empty_like(error)
+    worst = 0.0
+    for _ in range(3):
+        image = matrix @ error
+        before = float(np.vdot(error, image))
+        if not before > 0.0:
+            break
+        factor.solve(image, found)
+        error -= found
+        after = float(np.vdot(error, matrix @ error))
+        share = math.sqrt(max(after, 0.0) / before)
+        worst = max(worst, share if math.isfinite(share) else math.inf)
+        error /= math.sqrt(after) if 0.0 < after < math.inf else 1.0
+    return worst
+
+
+def _padded(size: Offsets, multiple: int) -> Offsets:
+    return -(-size // multiple) * multiple
+
+
+def _schedule(tree: Dissection, costs: Offsets, tallest: int) -> Schedule:
+    """Split the tree at its top until there are TASKS subtrees, always the costliest next."""
+    blocks = len(tree.parents)
+    sizes, totals = np.ones(blocks, np.int64), costs.copy()
+    children: list[list[int]] = [[] for _ in range(blocks)]
+    tasks = []
+    for b, parent in enumerate(tree.parents):
+        if parent < 0:
+            tasks.append(b)
+            continue
+        sizes[parent] += sizes[b]
+        totals[parent] += totals[b]
+        children[parent].append(b)
+    tops = []
+    while len(tasks) < TASKS and any(children[b] for b in tasks):
+        costliest = max((b for b in tasks if children[b]), key=lambda b: int(totals[b]))
+        tasks.remove(costliest)
+        tasks += children[costliest]
+        tops.append(costliest)
+    tasks.sort()
+    lasts = np.array(tasks, np.int32)
+    tops.sort()
+    shared = [np.arange(tree.firsts[b], tree.firsts[b + 1]) for b in tops]
+    return Schedule(
+        (lasts - sizes[lasts] + 1).astype(np.int32),
+        lasts,
+        np.array(tops, np.int32),
+        np.concatenate([*shared, np.zeros(0)]).astype(np.int32),
+        tallest,
+    )
+
+
+def _private_rows(blocks: Blocks, schedule: Schedule, count: int) -> Indices:
+    """The blocks' rows, with shared unknowns replaced by each task's copies of them."""
+    rows = blocks.rows.copy()
+    place = np.full(count, -1, np.int64)
+    place[schedule.shared] = np.arange(len(schedule.shared))
+    for task, (first, last) in enumerate(zip(*schedule[:2], strict=True)):
+        own = slice(blocks.row_starts[first], blocks.row_starts[last + 1])
+        at = place[rows[own]]
+        copies = count + task * len(schedule.shared) + at
+        rows[own] = np.where(at >= 0, copies, rows[own])
+    return rows
+
+
+@parallel_kernel
+def _add_solution(blocks: Blocks, schedule: Schedule, b: Floats, x: Floats, work: Singles) -> None:
+    """Up all tasks' subtrees at once, up and down the blocks above them, down the subtrees."""
+    for task in prange(len(schedule.task_firsts)):
+        _climb(blocks, schedule, task, b, work)
+    _turn(blocks, schedule, b, x, work)
+    for task in prange(len(schedule.task_firsts)):
+        _descend(blocks, schedule, task, x, work)
+
+
+@kernel
+def _climb(blocks: Blocks, schedule: Schedule, task: int, b: Floats, work: Singles) -> None:
+    """Forward substitution in a task's subtree."""
+    first, last = schedule.task_firsts[task], schedule.task_lasts[task]
+    for v in range(blocks.firsts[first], blocks.firsts[last + 1]):
+        work[v, 0], work[v, 1], work[v, 2] = b[v, 0], b[v, 1], b[v, 2]
+    copies = len(b) + task * len(schedule.shared)
+    work[copies : copies + len(schedule.shared)] = 0.0
+    scratch = np.empty((schedule.tallest, 3), work.dtype)
+    for block in range(first, last + 1):
+        _send_up(blocks, block, work, scratch)
+
+
+@kernel
+def _turn(blocks: Blocks, schedule: Schedule, b: Floats, x: Floats, work: Singles) -> None:
+    """Both substitutions in the blocks above the tasks; the tasks' updates are added in order."""
+    shared, tasks = schedule.shared, len(schedule.task_firsts)
+    for h in range(len(shared)):
+        v = shared[h]
+        for d in range(3):
+            work[v, d] = b[v, d]
+            for t in range(tasks):
+                work[v, d] += work[len(b) + t * len(shared) + h, d]
+    scratch = np.empty((schedule.tallest, 3), work.dtype)
+    for block in schedule.tops:
+        _send_up(blocks, block, work, scratch)
+    for block in schedule.tops[::-1]:
+        _send_down(blocks, block, work, scratch)
+    for h in range(len(shared)):
+        v = shared[h]
+        for d in range(3):
+            x[v, d] += work[v, d]
+            for t in range(tasks):
+                work[len(b) + t * len(shared) + h, d] = work[v, d]
+
+
+@kernel
+def _descend(blocks: Blocks, schedule: Schedule, task: int, x: Floats, work: Singles) -> None:
+    """Backward substitution in a task's subtree; the solution is added to x."""
+    first, last = schedule.task_firsts[task], schedule.task_lasts[task]
+    scratch = np.empty((schedule.tallest, 3), work.dtype)
+    for block in range(last, first - 1, -1):
+        _send_down(blocks, block, work, scratch)
+    for v in range(blocks.firsts[first], blocks.firsts[last + 1]):
+        for d in range(3):
+            x[v, d] += work[v, d]
+
+
+@kernel
+def _send_up(blocks: Blocks, block: int, work: Singles, scratch: Singles) -> None:
+    """Forward substitution of one block: take G b from the later unknowns that it touches."""
+    first = blocks.firsts[block]
+    k = blocks.firsts[block + 1] - first
+    rows = blocks.rows[blocks.row_starts[block] : blocks.row_starts[block + 1]]
+    height = (k + STEP - 1) // STEP * STEP
+    scratch[:k] = work[first : first + k]
+    scratch[k:height] = 0.0
+    sums = np.empty(3 * WIDTH, work.dtype)
+    at = blocks.up_starts[block]
+    for low in range(0, len(rows), WIDTH):
+        _multiply(scratch, blocks.ups[at : at + height * WIDTH], sums)
+        at += height * WIDTH
+        for h in range(min(WIDTH, len(rows) - low)):
+            v = rows[low + h]
+            work[v, 0] += sums[h]
+            work[v, 1] += sums[WIDTH + h]
+            work[v, 2] += sums[2 * WIDTH + h]
+
+
+@kernel
+def _send_down(blocks: Blocks, block: int, work: Singles, scratch: Singles) -> None:
+    """Backward substitution of one block: its pivot's inverse times b, less G^T times the later."""
+    first = blocks.firsts[block]
+    k = blocks.firsts[block + 1] - first
+    rows = blocks.rows[blocks.row_starts[block] : blocks.row_starts[block + 1]]
+    size = k + len(rows)
+    height = (size + STEP - 1) // STEP * STEP
+    scratch[:k] = work[first : first + k]
+    for h in range(len(rows)):
+        v = rows[h]
+        scratch[k + h, 0], scratch[k + h, 1], scratch[k + h, 2] = work[v, 0], work[v, 1], work[v, 2]
+    scratch[size:height] = 0.0
+    sums = np.empty(3 * WIDTH, work.dtype)
+    at = blocks.down_starts[block + 1]
+    for low in range(0, k, WIDTH):
+        _multiply(scratch, blocks.downs[at : at + height * WIDTH], sums)
+        at += height * WIDTH
+        for h in range(min(WIDTH, k - low)):
+            v = first + low + h
+            work[v, 0], work[v, 1], work[v, 2] = sums[h], sums[WIDTH + h], sums[2 * WIDTH + h]
+
+
+@kernel
+def _multiply(vectors: Singles, panel: Singles, sums: Singles) -> None:
+    """Three vectors (n, 3) times a panel (n, WIDTH) into sums (3 WIDTH,).
+
+    The inner loop has a constant length and fetches each sum once for STEP rows, so that it
+    compiles to little but fused multiply-adds.
+    """
+    for h in range(3 * WIDTH):
+        sums[h] = 0.0
+    for step in range(len(panel) // (STEP * WIDTH)):
+        w = panel[step * STEP * WIDTH : (step + 1) * STEP * WIDTH]
+        v = vectors[step * STEP : (step + 1) * STEP]
+        a0, a1, a2, a3 = v[0, 0], v[1, 0], v[2, 0], v[3, 0]
+        a4, a5, a6, a7 = v[4, 0], v[5, 0], v[6, 0], v[7, 0]
+        b0, b1, b2, b3 = v[0, 1], v[1, 1], v[2, 1], v[3, 1]
+        b4, b5, b6, b7 = v[4, 1], v[5, 1], v[6, 1], v[7, 1]
+        c0, c1, c2, c3 = v[0, 2], v[1, 2], v[2, 2], v[3, 2]
+        c4, c5, c6, c7 = v[4, 2], v[5, 2], v[6, 2], v[7, 2]
+        for h in range(WIDTH):
+            w0, w1, w2, w3 = w[h], w[WIDTH + h], w[2 * WIDTH + h], w[3 * WIDTH + h]
+            w4, w5 = w[4 * WIDTH + h], w[5 * WIDTH + h]
+            w6, w7 = w[6 * WIDTH + h], w[7 * WIDTH + h]
+            sums[h] += (w0 * a0 + w1 * a1 + w2 * a2 + w3 * a3) + (
+                w4 * a4 + w5 * a5 + w6 * a6 + w7 * a7
+            )
+            sums[WIDTH + h] += (w0 * b0 + w1 * b1 + w2 * b2 + w3 * b3) + (
+                w4 * b4 + w5 * b5 + w6 * b6 + w7 * b7
+            )
+            sums[2 * WIDTH + h] += (w0 * c0 + w1 * c1 + w2 * c2 + w3 * c3) + (
+                w4 * c4 + w5 * c5 + w6 * c6 + w7 * c7
+            )
+
+
+@kernel
+def _symbolic(starts: Indices, columns: Indices, tree: Dissection) -> tuple[Offsets, Indices]:
+    """The later unknowns that each block touches, ascending."""
+    firsts, parents = tree.firsts, tree.parents
+    blocks = len(parents)
+    seen = np.full(len(tree.order), -1, np.int32)
+    row_starts = np.zeros(blocks + 1, np.int64)
+    rows = np.empty(4 * len(tree.order) + 64, np.int32)
+    filled = 0
+    child = np.full(blocks, -1, np.int32)  # the last child of each block, and its elder siblings
+    elder = np.full(blocks, -1, np.int32)
+    for b in range(blocks):
+        begin, last = filled, firsts[b + 1]
+        for v in range(firsts[b], last):
+            for h in range(starts[v], starts[v + 1]):
+                u = columns[h]
+                if u >= last and seen[u] != b:
+                    seen[u] = b
+                    rows, filled = _append(rows, filled, u)
+        c = child[b]
+        while c >= 0:
+            for h in range(row_starts[c], row_starts[c + 1]):
+                u = rows[h]
+                if u >= last and seen[u] != b:
+                    seen[u] = b
+                    rows, filled = _append(rows, filled, u)
+            c = elder[c]
+        rows[begin:filled].sort()
+        row_starts[b + 1] = filled
+        if parents[b] >= 0:
+            elder[b], child[parents[b]] = child[parents[b]], b
+    return row_starts, rows[:filled].copy()
+
+
+@kernel
+def _append(rows: Indices, filled: int, value: int) -> tuple[Indices, int]:
+    if filled == len(rows):
+        longer = np.empty(2 * len(rows), np.int32)
+        longer[:filled] = rows
+        rows = longer
+    rows[filled] = value
+    return rows, filled + 1
+
+
+@kernel
+def _factorise(
+    starts: Indices, columns: Indices, data: Floats, parents: Indices, blocks: Blocks
+) -> None:
+    """Fill the blocks' values, block by block from the leaves of the tree to its root."""
+    firsts, row_starts, rows = blocks.firsts, blocks.row_starts, blocks.rows
+    count = len(firsts) - 1
+    place = np.empty(len(starts), np.int32)
+    pending = np.empty(count, np.int64)  # blocks whose update waits for their parent
+    waiting = 0
+    depth = 0
+    stack = np.empty(1 << 16)
+    for b in range(count):
+        first, last = firsts[b], firsts[b + 1]
+        k, m = last - first, row_starts[b + 1] - row_starts[b]
+        for v in range(first, last):
+            place[v] = v - first
+        for h in range(m):
+            place[rows[row_starts[b] + h]] = k + h
+        front = np.zeros((k + m, k + m))
+        for v in range(first, last):
+            for h in range(starts[v], starts[v + 1]):
+                if columns[h] >= first:
+                    front[place[columns[h]], v - first] = data[h]
+        while waiting > 0 and parents[pending[waiting - 1]] == b:
+            waiting -= 1
+            c = pending[waiting]
+            touched = rows[row_starts[c] : row_starts[c + 1]]
+            size = len(touched)
+            depth -= size * size
+            update = stack[depth : depth + size * size].reshape((size, size))
+            _extend_add(update, touched, place, front)
+        up = blocks.ups[blocks.up_starts[b] : blocks.up_starts[b + 1]]
+        down = blocks.downs[blocks.down_starts[b + 1] : blocks.down_starts[b]]
+        corner = _eliminate(front, k, up, down)
+        if m:
+            if depth + m * m > len(stack):
+                longer = np.empty(2 * (depth + m * m))
+                longer[:depth] = stack[:depth]
+                stack = longer
+            stack[depth : depth + m * m] = corner.ravel()
+            depth += m * m
+            pending[waiting] = b
+            waiting += 1
+
+
+@kernel
+def _extend_add(update: Floats, touched: Indices, place: Indices, front: Floats) -> None:
+    """Add a child's update, of the unknowns that it touched, to its parent's front."""
+    for i in range(len(touched)):
+        row = place[touched[i]]
+        for j in range(len(touched)):
+            front[row, place[touched[j]]] += update[i, j]
+
+
+@kernel
+def _eliminate(front: Floats, k: int, up: Singles, down: Singles) -> Floats:
+    """Invert the pivot block, store what both ways need; what is left for the later unknowns."""
+    size = len(front)
+    inverse = np.linalg.inv(front[:k, :k].copy())
+    below = front[k:, :k].copy()
+    G = np.dot(below, inverse)
+    _lay_panels(-G.T, up)
+    down_matrix = np.empty((size, k))
+    down_matrix[:k] = inverse
+    down_matrix[k:] = -G
+    _lay_panels(down_matrix, down)
+    rest: Floats = front[k:, k:] - np.dot(G, below.T.copy())
+    return rest
+
+
+@kernel
+def _lay_panels(matrix: Floats, panels: Singles) -> None:
+    """Copy a matrix into zeroed panels, WIDTH columns after WIDTH columns."""
+    rows, columns = matrix.shape
+    height = (rows + STEP - 1) // STEP * STEP
+    for column in range(columns):
+        at = column // WIDTH * height * WIDTH + column % WIDTH
+        for row in range(rows):
+            panels[at + row * WIDTH] = matrix[row, column]
