@@ -45,14 +45,16 @@ class Branch:
     """One branch of a sub-tree.
 
     Attributes:
-        chain: node ids from the fork that the branch hangs on to its leaf or to the root of the
-            sub-tree that was abstracted into its leaf (q of figure 5).
+        fork: the branch node that it belongs to.
+        chain: node ids from there (a short side chain: from the limb that it hangs on) to its leaf
+            or to the root of the sub-tree that was abstracted into its leaf (q of figure 5).
         extension: node ids that lead on from there along the longest chain to a leaf; () at a leaf.
         position: abstracted position of the branch's end (step 2 and 4), shape (3,) for a tree; for
             other per-node values, that weighted mean of theirs.
         length: accumulated length of all chains in the branch.
     """
 
+    fork: int
     chain: tuple[int, ...]
     extension: tuple[int, ...]
     position: Array
@@ -210,10 +212,10 @@ class Folding:
                 self._ends[node] = _weighted_mean(np.array([end for end, _ in folded]), lengths)
                 self._lengths[node] = lengths.sum()
 
-    def branch(self, chain: tuple[int, ...]) -> Branch:
-        """The branch along `chain`, with all that hangs on its end folded into that."""
+    def branch(self, fork: int, chain: tuple[int, ...]) -> Branch:
+        """The branch of `fork` along `chain`, with all that hangs on its end folded into that."""
         position, length = self._collapse(chain)
-        return Branch(chain, self._longest(chain[-1]), position, length)
+        return Branch(fork, chain, self._longest(chain[-1]), position, length)
 
     def walk(self, fork: int, child: int) -> tuple[int, ...]:
         """Nodes from `fork` over `child` to the next leaf or branch node (step 1)."""
@@ -261,23 +263,37 @@ class Folding:
 def fold(folding: Folding, top: int, excluded: int | None = None) -> tuple[Branch, ...]:
     """The branches of the sub-tree at `top`, without the child `excluded` (step 3)."""
     children = (child for child in folding.tree.children[top] if child != excluded)
-    return tuple(folding.branch(folding.walk(top, child)) for child in children)
+    return tuple(folding.branch(top, folding.walk(top, child)) for child in children)
 
 
-def unfold(
-    folding: Folding, top: int, opening: float, excluded: int | None = None
-) -> tuple[tuple[Branch, ...], tuple[int, ...]]:
-    """The limbs of the sub-tree at `top` with inner sub-trees opened, and the forks they hang on.
+@dataclass(frozen=True, slots=True, eq=False)
+class Limbs:
+    """A sub-tree with its larger inner sub-trees opened.
+
+    Attributes:
+        branches: the limbs.
+        sides: what hangs on the way, beside a limb or between forks, and is much shorter.
+        forks: the nodes that the limbs hang on, the sub-tree's root first.
+    """
+
+    branches: tuple[Branch, ...]
+    sides: tuple[Branch, ...]
+    forks: tuple[int, ...]
+
+
+def unfold(folding: Folding, top: int, opening: float, excluded: int | None = None) -> Limbs:
+    """The limbs of the sub-tree at `top` with inner sub-trees opened.
 
     Args:
         folding: of a rooted tree.
-        top: the root of the sub-tree; comes first among the forks.
+        top: the root of the sub-tree.
         opening: inner sub-trees are opened that reach at least this share of the whole one.
         excluded: a child of `top` that does not belong to the sub-tree.
     """
-    tree = folding.tree
-    shortest = SPUR * tree.heights[top]
+    heights = folding.tree.heights
+    shortest = SPUR * heights[top]
     branches: list[Branch] = []
+    sides: list[Branch] = []
     forks = [top]
     for fork in forks:
         for child in folding.limbs(fork, shortest):
@@ -285,12 +301,15 @@ def unfold(
                 continue
             chain = folding.walk_limb(fork, child, shortest)
             end = chain[-1]
-            large = tree.heights[end] >= opening * tree.heights[top]
-            if large and len(folding.limbs(end, shortest)) > 1:
+            if heights[end] >= opening * heights[top] and len(folding.limbs(end, shortest)) > 1:
                 forks.append(end)
             else:
-                branches.append(folding.branch(chain))
-    return tuple(branches), tuple(forks)
+                branches.append(folding.branch(fork, chain))
+            for node, ahead in pairwise(chain[1:]):
+                beside = (limb for limb in folding.limbs(node, shortest) if limb != ahead)
+                chains = (folding.walk_limb(node, limb, shortest) for limb in beside)
+                sides += [folding.branch(fork, side) for side in chains]
+    return Limbs(tuple(branches), tuple(sides), tuple(forks))
 
 
 def _unfoldings(folding: Folding, top: int, level: int, excluded: int | None) -> list[SubTree]:
@@ -302,10 +321,12 @@ def _unfoldings(folding: Folding, top: int, level: int, excluded: int | None) ->
     stem = stem[::-1] if len(stem) > 1 else []
     found = [SubTree(top, top, level, fold(folding, top, excluded), tuple(stem))]
     for opening in _openings(folding, top, excluded):
-        branches, forks = unfold(folding, top, opening, excluded)
+        limbs = unfold(folding, top, opening, excluded)
+        branches = limbs.branches + limbs.sides
         if {b.chain for b in branches} <= {b.chain for b in found[-1].branches}:
             continue
-        centre = _centre(tree, forks, np.array([b.position for b in branches]), branches)
+        ends = np.array([branch.position for branch in limbs.branches])
+        centre = _centre(tree, limbs.forks, ends, limbs.branches)
         coarser, plan = len(found[-1].branches), opening >= BODY_PLAN
         found.append(SubTree(top, centre, level, branches, tuple(stem), len(found), coarser, plan))
     return found
@@ -314,7 +335,7 @@ def _unfoldings(folding: Folding, top: int, level: int, excluded: int | None) ->
 def _openings(folding: Folding, top: int, excluded: int | None) -> list[float]:
     """Shares of the whole at which one more group of inner sub-trees opens, descending."""
     heights = folding.tree.heights
-    _, forks = unfold(folding, top, _SMALLEST, excluded)
+    forks = unfold(folding, top, _SMALLEST, excluded).forks
     whole = max(heights[top], 1e-300)
     shares = sorted((float(heights[fork] / whole) for fork in forks[1:]), reverse=True)
     last = [here for here, after in pairwise([*shares, 0.0]) if after < _ALIKE * here]
@@ -363,15 +384,16 @@ def simplify(tree: Tree) -> SimplifiedSource:
     if len(first := folding.limbs(tree.root, shortest)) == 1:
         stem = folding.walk_limb(tree.root, first[0], shortest)
     top = stem[-1] if len(folding.limbs(stem[-1], shortest)) > 1 else tree.root
-    branches, forks = unfold(folding, top, BODY_PLAN)
+    limbs = unfold(folding, top, BODY_PLAN)
+    branches = limbs.branches
     weights = np.array([branch.position for branch in branches]).reshape(-1, len(tree))
-    centre = _centre(tree, forks, weights @ tree.positions, branches)
+    centre = _centre(tree, limbs.forks, weights @ tree.positions, branches)
     vectors = weights @ tree.positions - tree.positions[centre]
     return SimplifiedSource(
         tree,
         tuple(branch.chain + branch.extension for branch in branches),
         weights,
-        forks,
+        limbs.forks,
         centre,
         stem if top != tree.root else (),
         float(np.linalg.norm(vectors, axis=1).max(initial=0.0)),

@@ -13,9 +13,9 @@ with the same stretch on the character. Those inner pairs carry no score.
 
 More pairs can make a larger sum, so where a part of the character can take all of the performer's
 branches, it wins over one that can take fewer. With `size_preference` = 0 the order is that of the
-scores; above 0 each pair is worth that much more if its target chain is at least half as long as
-the character's longest, and proportionally less below: limbs win over spurs that happen to point
-the same way, and a tail does not win over a leg.
+scores; above 0 each pair is worth that much more if its target chain is at least a third as long
+as the character's longest, and proportionally less below: limbs win over spurs that happen to
+point the same way, and a tail does not win over a leg.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ class _Candidates:
     subtrees: tuple[SubTree, ...]
     starts: NDArray[np.int64]  # (C + 1,)
     vectors: Array  # (T, 3) from the sub-tree's centre, its longest branch of length one
-    sizes: Array  # (T,) 1 for extended chains at least half as long as the longest, less below
+    sizes: Array  # (T,) 1 for extended chains at least a third as long as the longest, less below
 
 
 class TargetHierarchy:
@@ -146,7 +146,8 @@ class TargetHierarchy:
             plan, number = self._plan(source, candidates.subtrees[which], tuple(row))
             if number not in matches:
                 matches[number] = Match(score, *plan, merit)
-        return list(matches.values())[:limit]
+        # Equal up to rounding may have come in any order.
+        return sorted(matches.values(), key=lambda match: -match.merit)[:limit]
 
     def _for(self, branches: int, several_forks: bool) -> _Candidates:
         key = branches, several_forks
@@ -242,7 +243,7 @@ def _gather(
         block = np.array([branch.position for branch in subtree.branches])
         block -= tree.positions[subtree.centre]
         vectors[first:end] = block / max(np.linalg.norm(block, axis=1).max(), 1e-300)
-    sizes = np.minimum(2.0 * lengths / max(lengths.max(initial=0.0), 1e-300), 1.0)
+    sizes = np.minimum(3.0 * lengths / max(lengths.max(initial=0.0), 1e-300), 1.0)
     return _Candidates(tuple(chosen), starts, vectors, sizes)
 
 
@@ -263,7 +264,8 @@ def _plan(tree: Tree, source: SimplifiedSource, subtree: SubTree, columns: Chain
     ]
     pairs = [(chain, branch.chain + branch.extension) for chain, branch in limbs]
     stops = [len(branch.chain) for _, branch in limbs]
-    places = _place_forks(tree, source, subtree.root, pairs)
+    hang = [(chain[0], branch.fork) for chain, branch in limbs]
+    places = _place_forks(tree, source, subtree.root, hang)
     inner = _inner_pairs(tree, source, places)
     root = next(iter(places.values()))
     if source.stem and subtree.stem and root == subtree.root and source.stem[-1] in places:
@@ -274,17 +276,23 @@ def _plan(tree: Tree, source: SimplifiedSource, subtree: SubTree, columns: Chain
 
 
 def _place_forks(
-    tree: Tree, source: SimplifiedSource, root: int, limbs: Sequence[tuple[Chain, Chain]]
+    tree: Tree, source: SimplifiedSource, root: int, hang: Sequence[tuple[int, int]]
 ) -> dict[int, int]:
     """For each source fork the target node where its limbs meet, seen from the sub-tree's root.
 
     A fork that carries no matched limb lies where those that hang on it meet. The source fork
     nearest to the performer's root comes first.
+
+    Args:
+        tree: the target.
+        source: the performer.
+        root: the sub-tree's root.
+        hang: the source fork and the target fork of each pair of limbs.
     """
     places: dict[int, int] = {}
     hanging: dict[int, list[int]] = {fork: [] for fork in source.forks}
     for fork in reversed(source.forks):  # those further out first
-        own = [target[0] for chain, target in limbs if chain[0] == fork]
+        own = [target for carries, target in hang if carries == fork]
         below = hanging[fork]
         if own or len(below) > 1:
             places[fork] = _meet(tree, root, own or below)

@@ -55,3 +55,13 @@ def test_forty_branches_and_five_limbs_need_no_listing():
 def test_equal_tables_come_in_their_order():
     tables, _, _ = rank_assignments(np.ones((2, 6)), np.array([0, 2, 4, 6]), 3)
     assert tables.tolist() == [0, 1, 2]
+
+
+def test_no_choice_is_lost_or_listed_twice_where_all_are_equal():
+    values = np.random.default_rng(4).integers(0, 2, size=(3, 7)).astype(float)
+    for table in (np.ones((2, 6)), values, np.repeat(values[:, :2], 3, axis=1)):
+        _, columns, sums = rank_assignments(table, np.array([0, table.shape[1]]), 100)
+        np.testing.assert_allclose(
+            sums, [item[0] for item in by_listing(table, [0, table.shape[1]])]
+        )
+        assert len({tuple(sorted(row)) for row in columns}) == len(sums)

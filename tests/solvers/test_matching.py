@@ -201,6 +201,63 @@ def test_a_limb_that_points_at_the_viewer_counts_nothing():
     assert np.isfinite(scores(matches)).all()
 
 
+def test_a_limb_almost_end_on_counts_little():
+    target = star([0.0, 2.0], count=1)
+    tilted = target.positions.copy()
+    tilted[1] = (0.01, 0.0, 1.0)  # a fifth of what counts in full
+    match = rank_matches(arms(0.0, 2.0), Tree(target.parents, tilted), FRONT)[0]
+    assert match.score == pytest.approx(1.2, abs=1e-3)
+
+
+def test_the_spine_ends_where_the_first_of_its_limbs_leaves():
+    # pelvis 0 with two legs, spine 0-1-2, left arm at 2, right arm and head further up at 3
+    places = [(0, 0), (0, 1), (0, 2), (0, 2.2), (1, 2), (2, 2), (-1, 2.2), (-2, 2.2), (0, 3.4),
+              (0.1, -1), (0.1, -2), (-0.1, -1), (-0.1, -2)]  # fmt: skip
+    parents = [-1, 0, 1, 2, 2, 4, 3, 6, 3, 0, 9, 0, 11]
+    target = Tree(np.array(parents), np.array([(*p, 0.0) for p in places]))
+    source, names = body("thumb")
+    match = rank_matches(source, target, FRONT)[0]
+    assert match.root == 0
+    assert named(match, names, range(13)) >= {
+        ("pelvis", "chest", 0, 2),
+        ("chest", "left finger", 2, 5),
+        ("chest", "right finger", 3, 7),
+        ("chest", "head", 3, 8),
+    }
+
+
+def test_a_short_head_beside_a_long_arm_is_offered_too():
+    places = [(0, 0), (0, 1), (0, 2), (0, 2.2), (1, 2), (2, 2), (-1, 2.2), (-2, 2.2), (0, 2.8),
+              (0.1, -1), (0.1, -2), (-0.1, -1), (-0.1, -2)]  # fmt: skip
+    parents = [-1, 0, 1, 2, 2, 4, 3, 6, 3, 0, 9, 0, 11]
+    target = Tree(np.array(parents), np.array([(*p, 0.0) for p in places]))
+    source, names = body("thumb")
+    found = named(rank_matches(source, target, FRONT)[0], names, range(13))
+    assert found >= {("chest", "head", 3, 8), ("chest", "right finger", 2, 7)}
+
+
+def centipede(segments):
+    """A spine in the screen plane with a pair of legs on each of its nodes."""
+    parents, positions = [], []
+    for segment in range(segments):
+        parents.append(3 * (segment - 1) if segment else -1)
+        positions.append((0.0, 1.0 * segment, 0.0))
+        for x in (-1, 1):
+            parents.append(3 * segment)
+            positions.append((2.0 * x, 1.0 * segment + 0.2, 0.0))
+    return Tree(np.array(parents), np.array(positions))
+
+
+def test_every_stretch_between_several_forks_is_driven():
+    match = rank_matches(centipede(4), centipede(4), FRONT)[0]
+    assert match.score == pytest.approx(8.0)
+    assert list(match.pairs[match.limbs :]) == [
+        ((0, 3), (0, 3)),
+        ((3, 6), (3, 6)),
+        ((6, 9), (6, 9)),
+    ]
+
+
 @pytest.mark.parametrize("scale", [1e-6, 1.0, 1e6])
 def test_scores_ignore_scale_and_place(scale):
     source, _ = body()
@@ -255,15 +312,23 @@ def test_node_numbers_do_not_matter():
 
 
 @settings(max_examples=60, deadline=None)
-@given(st.integers(0, 100_000), st.integers(1, 80), st.sampled_from(["", "hip", "left", "finger"]))
+@given(
+    st.integers(0, 100_000),
+    st.integers(1, 80),
+    st.sampled_from(["", "centipede", "left", "finger"]),
+)
 def test_any_tree_gives_finite_scores_and_chains_that_can_be_driven(seed, count, without):
     rng = np.random.default_rng(seed)
     reach = int(rng.integers(1, 8))
     parents = np.array([-1] + [rng.integers(max(0, n - reach), n) for n in range(1, count)])
     positions = rng.normal(size=(count, 3)).round(int(rng.integers(0, 3)))
     target = Tree(parents, positions)
-    source, _ = body(*([without] if without not in ("", "hip") else []))
-    for match in rank_matches(source, target, FRONT, size_preference=float(rng.integers(0, 2))):
+    source = centipede(4) if without == "centipede" else body(*([without] if without else []))[0]
+    matches = rank_matches(source, target, FRONT, size_preference=float(rng.integers(0, 2)))
+    merits = [match.merit for match in matches]
+    assert merits == sorted(merits, reverse=True)
+    assert len({(match.root, match.pairs) for match in matches}) == len(matches)
+    for match in matches:
         assert np.isfinite(match.score)
         assert -match.limbs - 1e-9 <= match.score <= match.limbs + 1e-9
         chains = [t for _, t in match.pairs]

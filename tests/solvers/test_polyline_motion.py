@@ -245,6 +245,9 @@ def test_reset_forgets_the_last_frame():
     pose = polyline([1.0, 1.0], [0.0, np.radians(200.0)])
     retarget.rotations(polyline([1.0, 1.0], [0.0, np.radians(170.0)]))
     turned_on = retarget.rotations(pose)  # the long way
+    expected = np.interp((np.arange(8) + 0.5) / 8, [0.25, 0.75], [0.0, np.radians(200.0)])
+    bones = np.column_stack([np.cos(expected), np.sin(expected), np.zeros(8)]) / 8
+    np.testing.assert_allclose(np.diff(apply(straight(8), turned_on), axis=0), bones, atol=1e-9)
     retarget.reset()
     fresh = retarget.rotations(pose)
     assert angle_between(turned_on, fresh).max() > 0.5
