@@ -31,6 +31,8 @@ Array = NDArray[np.float64]
 BODY_PLAN: Final = 0.25
 # A side chain shorter than this share of the whole is a spur of the extraction or a twist joint.
 SPUR: Final = 0.1
+# Of a performer; two hands have ten. The longest are kept.
+MOST_LIMBS: Final = 20
 # Where the second limb of a fork is shorter than this share of the first, the first goes on through
 # it: a wing past its feathers, an arm past a twist joint.
 _SIDE: Final = 0.4
@@ -385,7 +387,8 @@ def simplify(tree: Tree) -> SimplifiedSource:
         stem = folding.walk_limb(tree.root, first[0], shortest)
     top = stem[-1] if len(folding.limbs(stem[-1], shortest)) > 1 else tree.root
     limbs = unfold(folding, top, BODY_PLAN)
-    branches = limbs.branches
+    longest = sorted(limbs.branches, key=lambda branch: -branch.length)[:MOST_LIMBS]
+    branches = tuple(branch for branch in limbs.branches if branch in longest)
     weights = np.array([branch.position for branch in branches]).reshape(-1, len(tree))
     centre = _centre(tree, limbs.forks, weights @ tree.positions, branches)
     vectors = weights @ tree.positions - tree.positions[centre]

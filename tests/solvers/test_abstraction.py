@@ -192,3 +192,11 @@ def test_branch_vectors_follow_the_pose():
     source = simplify(tree)
     turned = tree.positions @ np.array([[0.0, -1, 0], [1, 0, 0], [0, 0, 1]]).T + 5.0
     np.testing.assert_allclose(source.branch_vectors(turned), [[0, 1, 0], [-1, 0, 0]], atol=1e-12)
+
+
+def test_a_source_keeps_its_longest_limbs():
+    angles = np.linspace(0.0, 6.0, 90)
+    tips = np.column_stack([np.cos(angles), np.sin(angles), angles]) * (1 + angles[:, None])
+    tree = Tree(np.array([-1] + [0] * 90), np.concatenate([np.zeros((1, 3)), tips]))
+    source = simplify(tree)
+    assert [chain[1] for chain in source.chains] == list(range(71, 91))
