@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from scipy.spatial import KDTree
 
 from solvers.arap_cells import SPOKES, SPOKES_AND_RIMS, build_cells
-from solvers.arap_kernels import energy_terms, fit_cells, residual
+from solvers.arap_kernels import energy_terms, fit_cells, place_outside, residual
 from solvers.arap_layout import (
     Frame,
     Layout,
@@ -46,6 +46,9 @@ from solvers.laplacian import Floats, Ints
 # of the character's size.
 _JUMP_ANGLE = math.radians(30.0)
 _JUMP_PATH = 0.1
+
+# The rest pose must start this much nearer to rigid before it takes the last answer's place.
+_BETTER = 0.9
 
 
 class ArapSolver:
@@ -115,7 +118,7 @@ class ArapSolver:
             self._local_step(self._x)
             self._global_step()
         answer = np.empty_like(self._x)
-        answer[layout.order] = self._frame.outside(self._x)
+        place_outside(self._x, layout.order, self._frame.centre, self._frame.size, answer)
         answer[layout.order[layout.free : layout.active]] = goals
         return answer
 
@@ -135,17 +138,20 @@ class ArapSolver:
         """Put the start of this frame's iterations into x: handles at their goals, (H, 3)."""
         free, active = self._layout.free, self._layout.active
         handles = slice(free, active)
-        here, rest = self._x[handles].copy(), self._rest[handles]
+        here = self._x[handles].copy()
         step = fit_motions(here, goals, self._group_of, self._group_count)
-        whole = fit_motions(rest, goals, self._group_of, self._group_count)
         follow(self._x[:free], self._influences, step, self._x[:free])
-        follow(self._rest[active:], self._carriers, whole, self._x[active:])
         self._x[handles] = goals
         angle, path = farthest_motion(step, here, self._group_of)
-        if angle > _JUMP_ANGLE or path > _JUMP_PATH:
+        has_jumped = angle > _JUMP_ANGLE or path > _JUMP_PATH
+        if not has_jumped and active == len(self._rest):
+            return
+        whole = fit_motions(self._rest[handles], goals, self._group_of, self._group_count)
+        follow(self._rest[active:], self._carriers, whole, self._x[active:])
+        if has_jumped:
             follow(self._rest[:free], self._influences, whole, self._from_rest[:free])
             self._from_rest[handles] = goals
-            if self._energy_of(self._from_rest) < 0.9 * self._energy_of(self._x):
+            if self._energy_of(self._from_rest) < _BETTER * self._energy_of(self._x):
                 self._x[:active] = self._from_rest[:active]
 
     def _energy_of(self, x: Floats) -> float:

@@ -12,7 +12,7 @@ from numba import prange
 
 from solvers.arap_cells import Cells, Terms
 from solvers.compiled import parallel_kernel
-from solvers.laplacian import Floats
+from solvers.laplacian import Floats, Ints
 from solvers.rotation_fit import LANES, SCRATCH, fit_rotations
 
 _R = 9 * LANES
@@ -98,3 +98,13 @@ def energy_terms(x: Floats, R: Floats, rest: Floats, terms: Terms, out: Floats) 
         d1 = x[a, 1] - x[b, 1] - (R[c, 3] * e0 + R[c, 4] * e1 + R[c, 5] * e2)
         d2 = x[a, 2] - x[b, 2] - (R[c, 6] * e0 + R[c, 7] * e1 + R[c, 8] * e2)
         out[t] = terms.weights[t] * (d0 * d0 + d1 * d1 + d2 * d2)
+
+
+@parallel_kernel
+def place_outside(x: Floats, order: Ints, centre: Floats, size: float, out: Floats) -> None:
+    """Vertex order[i] of out (N, 3) is x[i] times the size, plus the centre (3,)."""
+    for i in prange(len(order)):
+        v = order[i]
+        out[v, 0] = x[i, 0] * size + centre[0]
+        out[v, 1] = x[i, 1] * size + centre[1]
+        out[v, 2] = x[i, 2] * size + centre[2]

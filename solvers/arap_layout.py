@@ -37,10 +37,6 @@ class Frame:
         """Points (N, 3) in this frame."""
         return (points - self.centre) / self.size
 
-    def outside(self, points: Floats) -> Floats:
-        """Points (N, 3) of this frame in the mesh's own unit."""
-        return points * self.size + self.centre
-
 
 @dataclass(frozen=True, slots=True)
 class Layout:

@@ -89,6 +89,11 @@ class BlockFactor:
         x[:] = 0.0
         self.add_solution(b, x)
 
+    @property
+    def nbytes(self) -> int:
+        """The bytes that a solve reads of the factor."""
+        return self._blocks.ups.nbytes + self._blocks.downs.nbytes + 2 * self._blocks.rows.nbytes
+
     def _factorise(
         self, matrix: sp.csr_matrix, tree: Dissection, precision: type[np.floating[Any]]
     ) -> None:

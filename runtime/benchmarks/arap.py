@@ -1,0 +1,174 @@
+"""How long an iteration of ARAP takes, beside libigl's C++ on the same mesh in the same run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numba import get_num_threads, prange
+from numpy.typing import NDArray
+
+from solvers.arap import ArapSolver
+from solvers.arap_cells import SPOKES, build_cells
+from solvers.arap_kernels import fit_cells, residual
+from solvers.arap_layout import lay_out
+from solvers.block_factor import BlockFactor
+from solvers.compiled import parallel_kernel
+
+SIZES = (2_500, 10_000, 40_000, 160_000)
+REPEATS = 9
+ITERATIONS = 5  # of the longer of two runs, whose difference leaves out what is not iterating
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+def run(sizes: Sequence[int] = SIZES) -> dict[str, object]:
+    """Print a table and return it: milliseconds per iteration at the median, ours and libigl's."""
+    bandwidth = _bandwidth()
+    print(f"arap: one iteration, {get_num_threads()} threads, memory moves {bandwidth:.0f} GB/s")
+    print(
+        f"{'vertices':>9} {'ours ms':>8} {'libigl':>8} {'times':>6} {'a tick':>7} {'local':>7}"
+        f" {'rhs':>7} {'solve':>7} {'MB':>6} {'memory':>7} {'build s':>8}"
+    )
+    rows = []
+    for size in sizes:
+        row = _measure(*_torus(size))
+        row["memory_share"] = row["megabytes"] / row["ours_ms"] / bandwidth
+        rows.append(row)
+        peer = row["libigl_ms"]
+        print(
+            f"{row['vertices']:>9} {row['ours_ms']:8.3f} "
+            + (f"{peer:8.2f} {peer / row['ours_ms']:6.1f} " if peer else f"{'-':>8} {'-':>6} ")
+            + f"{row['tick_ms']:7.3f} {row['local_ms']:7.3f} {row['rhs_ms']:7.3f}"
+            f" {row['solve_ms']:7.3f} {row['megabytes']:6.1f} {row['memory_share']:6.0%}"
+            f" {row['build_s']:8.2f}",
+            flush=True,
+        )
+    return {"threads": get_num_threads(), "bandwidth_gb_s": bandwidth, "sizes": rows}
+
+
+def _measure(vertices: Floats, faces: Ints) -> dict[str, Any]:
+    """Both solvers on the same handles and targets, in turn, so that both see the same machine."""
+    handles, targets = _handles(vertices)
+    start = perf_counter()
+    ours = ArapSolver(vertices, faces, handles)
+    build = perf_counter() - start
+    answer = ours.solve(targets, ITERATIONS)
+    peer = _libigl(vertices, faces, handles, targets, answer)
+    stages, moved = _stages(vertices, faces, handles)
+    for call in stages.values():
+        call()
+    times: dict[str, list[float]] = {}
+    for _ in range(REPEATS):
+        for name, call in [
+            ("one", partial(ours.solve, targets, 1)),
+            ("many", partial(ours.solve, targets, ITERATIONS)),
+            *stages.items(),
+        ]:
+            times.setdefault(name, []).append(_milliseconds(call))
+        if peer is not None:
+            for name, count in (("peer one", 1), ("peer many", ITERATIONS)):
+                times.setdefault(name, []).append(_milliseconds(partial(peer, count)))
+    median = {name: float(np.median(values)) for name, values in times.items()}
+    return {
+        "vertices": len(vertices),
+        "ours_ms": (median["many"] - median["one"]) / (ITERATIONS - 1),
+        "libigl_ms": (median["peer many"] - median["peer one"]) / (ITERATIONS - 1)
+        if peer is not None
+        else None,
+        "tick_ms": median["one"],
+        **{name: median[name] for name in stages},
+        "megabytes": moved / 1e6,
+        "build_s": build,
+    }
+
+
+def _stages(
+    vertices: Floats, faces: Ints, handles: Ints
+) -> tuple[dict[str, Callable[[], object]], int]:
+    """The three stages of an iteration by themselves, and the bytes that they cannot but move."""
+    layout = lay_out(vertices, faces, handles)
+    x = vertices[layout.order].copy()
+    mesh = build_cells(x, layout.faces, SPOKES)
+    free = layout.free
+    factor = BlockFactor(sp.csr_matrix(mesh.laplacian[:free, :free]), layout.tree)
+    R, laplace_x, b = np.empty((len(x), 9)), np.empty_like(x), np.zeros((free, 3))
+    arrays = mesh.cells.fits, mesh.cells.pulls, mesh.cells.own
+    moved = sum(array.nbytes for array in arrays) + 2 * mesh.cells.neighbours.nbytes
+    moved += factor.nbytes + 2 * (R.nbytes + laplace_x.nbytes + b.nbytes) + 3 * x.nbytes
+    return {
+        "local_ms": lambda: fit_cells(x, mesh.cells, R, laplace_x),
+        "rhs_ms": lambda: residual(R, laplace_x, mesh.cells, b),
+        "solve_ms": lambda: factor.add_solution(b, x),
+    }, moved
+
+
+def _libigl(
+    vertices: Floats, faces: Ints, handles: Ints, targets: Floats, start: Floats
+) -> Callable[[int], object] | None:
+    """A call of libigl's solver for a number of iterations; None without libigl."""
+    try:
+        import igl  # noqa: PLC0415  an optional peer
+    except ImportError:
+        return None
+    data = igl.ARAPData()
+    data.energy = igl.ARAP_ENERGY_TYPE_SPOKES
+    data.max_iter = 1
+    igl.arap_precomputation(vertices, faces, 3, handles.astype(np.int32), data)
+
+    def solve(iterations: int) -> object:
+        data.max_iter = iterations
+        return igl.arap_solve(targets, data, start)
+
+    return solve
+
+
+def _torus(count: int) -> tuple[Floats, Ints]:
+    """A torus of about `count` vertices with nearly equilateral triangles."""
+    across = round((count * 0.35) ** 0.5)
+    along = round(count / across)
+    u, v = np.meshgrid(np.arange(along), np.arange(across), indexing="ij")
+    a = (u * across + v).ravel()
+    b = ((u + 1) % along * across + v).ravel()
+    c = ((u + 1) % along * across + (v + 1) % across).ravel()
+    d = (u * across + (v + 1) % across).ravel()
+    big, small = 2 * np.pi * u / along, 2 * np.pi * v / across
+    ring = 1.0 + 0.35 * np.cos(small)
+    vertices = np.stack([ring * np.cos(big), 0.35 * np.sin(small), ring * np.sin(big)], axis=-1)
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    return vertices.reshape(-1, 3), faces.astype(np.int64)
+
+
+def _handles(vertices: Floats) -> tuple[Ints, Floats]:
+    """Two opposite patches of 1 % each, one of which is pulled away."""
+    order = np.argsort(vertices[:, 0], kind="stable")
+    patch = max(1, len(vertices) // 100)
+    handles = np.concatenate([order[:patch], order[-patch:]])
+    targets = vertices[handles]
+    targets[patch:] += [0.3, 0.2, 0.1]
+    return handles, targets
+
+
+def _milliseconds(call: Callable[[], object]) -> float:
+    start = perf_counter()
+    call()
+    return 1e3 * (perf_counter() - start)
+
+
+@parallel_kernel
+def _copy(source: Floats, target: Floats) -> None:
+    for i in prange(len(source)):
+        target[i] = source[i]
+
+
+def _bandwidth() -> float:
+    """Gigabytes a second that all cores together read and write, at best."""
+    source, target = np.ones(8_000_000), np.empty(8_000_000)
+    _copy(source, target)
+    best = min(_milliseconds(lambda: _copy(source, target)) for _ in range(8))
+    return 2 * source.nbytes / best / 1e6
