@@ -15,7 +15,7 @@ from runtime.characters.cache import cached_skeleton
 from runtime.characters.mesh_data import FileMesh
 from runtime.characters.mesh_file import MESH_SUFFIXES, read_mesh_file
 from runtime.characters.palette import palette_color
-from runtime.characters.placement import place, placed
+from runtime.characters.placement import guess_rotation, placed, placement_matrix
 from runtime.characters.weld import first_occurrences, weld
 
 RIG_SUFFIXES = (".glb", ".gltf", ".vrm")
@@ -46,8 +46,9 @@ def _from_mesh(name: str, mesh: FileMesh, path: Path) -> Character:
     vertex = weld(mesh.vertices)
     welded = mesh.vertices[first_occurrences(vertex)]
     faces = vertex[mesh.faces]
-    placement = place(welded, faces)
-    vertices = placed(placement.matrix, welded)
+    rotation, guesses = guess_rotation(welded, faces)
+    placement = placement_matrix(rotation, welded[np.unique(faces)])
+    vertices = placed(placement, welded)
     return Character(
         name=name,
         vertices=vertices,
@@ -55,8 +56,8 @@ def _from_mesh(name: str, mesh: FileMesh, path: Path) -> Character:
         skeleton=_extracted(vertices, faces, path),
         weights=None,
         surface=_surface(mesh, vertex),
-        placement=placement.matrix,
-        notes=mesh.notes + placement.notes,
+        placement=placement,
+        notes=mesh.notes + guesses,
     )
 
 

@@ -2,10 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
+
+from runtime.characters.upright import (
+    X,
+    Y,
+    faces_away,
+    flat_axis,
+    stands_along_z,
+    surface_samples,
+)
 
 FloatArray = NDArray[np.float64]
 
@@ -15,31 +22,58 @@ HEIGHT = 1.7
 WIDTH = 2.2
 """[m] that a character may be wide or deep."""
 
+UPRIGHT = np.eye(3)
+Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
+"""Takes +Z up, facing -Y, as in Blender and most scans, to +Y up, facing +Z."""
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Placement:
-    """The way from file to stage, and what was guessed for it.
+ABOUT_FACE = np.diag([-1.0, 1.0, -1.0])
+SIDE_TO_FRONT = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
+"""Takes what faces +X to face +Z."""
 
-    Attributes:
-        matrix: (4, 4) takes file coordinates to stage coordinates: rotation, scale, translation.
-        notes: one short line each.
+
+def guess_rotation(
+    vertices: FloatArray, faces: NDArray[np.int64]
+) -> tuple[FloatArray, tuple[str, ...]]:
+    """The rotation (3, 3) that makes a surface stand upright and face +Z, and notes of guesses.
+
+    A sheet is turned so that the stage sees its face. A creature that looks along x is left: its
+    side shows most of it.
+
+    Args:
+        vertices: (N, 3) in a file's axes, which it does not name.
+        faces: (F, 3) into `vertices`.
     """
+    points = surface_samples(vertices, faces)
+    thin = flat_axis(points)
+    if thin is not None:
+        rotation = {X: SIDE_TO_FRONT, Y: Z_UP}.get(thin, UPRIGHT)
+        return rotation, (f"a flat sheet across {'xyz'[thin]}: put upright, facing the front",)
+    rotation, notes = UPRIGHT, ["up axis guessed: +Y"]
+    if stands_along_z(points):
+        rotation, notes = Z_UP, ["up axis guessed: +Z, facing -Y"]
+    if faces_away(points @ rotation.T):
+        rotation = ABOUT_FACE @ rotation
+        notes.append("feet point backwards: turned about to face the front")
+    return rotation, tuple(notes)
 
-    matrix: FloatArray
-    notes: tuple[str, ...]
 
+def placement_matrix(rotation: FloatArray, points: FloatArray) -> FloatArray:
+    """The matrix (4, 4) that turns, scales and puts points (n, 3) down in the middle of the stage.
 
-def stage_from(rotation: FloatArray, points: FloatArray) -> FloatArray:
-    """The placement (4, 4) that turns by `rotation` (3, 3), scales and sets down points (n, 3)."""
+    The scale is uniform and the largest that keeps within `HEIGHT` and, to the sides and the back,
+    `WIDTH`; the lowest point is at y = 0.
+
+    Args:
+        rotation: (3, 3) from the file's axes to the stage's.
+        points: (n, 3) in the file's axes and unit, not all in one place.
+    """
     turned = points @ rotation.T
     low, high = turned.min(axis=0), turned.max(axis=0)
-    extent = high - low
-    scale = min(
-        limit / size for limit, size in zip((WIDTH, HEIGHT, WIDTH), extent, strict=True) if size > 0
-    )
+    limits = np.array([WIDTH, HEIGHT, WIDTH])
+    scale = 1.0 / ((high - low) / limits).max()
     matrix = np.eye(4)
     matrix[:3, :3] = scale * rotation
-    foot = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
+    foot = np.array([(low[0] + high[0]) / 2.0, low[1], (low[2] + high[2]) / 2.0])
     matrix[:3, 3] = -scale * foot
     return matrix
 
@@ -48,9 +82,3 @@ def placed(matrix: FloatArray, points: FloatArray) -> FloatArray:
     """Points (n, 3) taken through a placement (4, 4)."""
     moved: FloatArray = points @ matrix[:3, :3].T + matrix[:3, 3]
     return moved
-
-
-def place(vertices: FloatArray, faces: NDArray[np.int64]) -> Placement:
-    """Guess how a surface (N, 3), (F, 3) stands and put it on the stage."""
-    used = vertices[np.unique(faces)]
-    return Placement(stage_from(np.eye(3), used), ())
