@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import os
 import sys
 import tempfile
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 Tree = tuple[NDArray[np.int64], NDArray[np.float64]]  # parents (K,), positions (K, 3)
 Extract = Callable[[NDArray[np.float64], NDArray[np.int64]], Tree]
 
-MOST_NODES = 10_000
+MOST_BYTES = 1 << 20
 
 
 def cached_skeleton(
@@ -59,14 +60,16 @@ def _key(vertices: NDArray[np.float64], faces: NDArray[np.int64], version: int) 
 def _stored(path: Path) -> Tree | None:
     """The tree in a file, or None where there is none or it is damaged."""
     try:
-        with np.load(path, allow_pickle=False) as stored:
+        if path.stat().st_size > MOST_BYTES:
+            return None
+        with np.load(io.BytesIO(path.read_bytes()), allow_pickle=False) as stored:
             parents = np.asarray(stored["parents"], dtype=np.int64)
             positions = np.asarray(stored["positions"], dtype=np.float64)
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, NotImplementedError):
         return None
-    count = len(parents)
-    sound = parents.shape == (count,) and positions.shape == (count, 3) and count <= MOST_NODES
-    if not sound or count == 0 or not np.isfinite(positions).all():
+    if parents.size == 0 or parents.ndim != 1 or positions.shape != (len(parents), 3):
+        return None
+    if not np.isfinite(positions).all():
         return None
     return (parents, positions) if _is_tree(parents) else None
 

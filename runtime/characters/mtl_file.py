@@ -25,10 +25,12 @@ def read_mtl(path: Path) -> tuple[dict[str, Material], list[str]]:
     `Kd` is taken as sRGB and replaced by white under a `map_Kd`, which most exporters mean.
     """
     try:
+        if not path.is_file():
+            raise FileNotFoundError(path)
         with path.open("rb") as file:
             text = file.read(MOST_BYTES).decode("utf-8", errors="replace")
-    except (OSError, ValueError):
-        return {}, [f"material library {path.name} is not there: default colours"]
+    except (OSError, ValueError):  # ValueError: a name that no file can have
+        return {}, [f"material library {path.name!r} cannot be read: default colours"]
     settings: dict[str, dict[str, str]] = {}
     current: dict[str, str] = {}
     for line in text.splitlines():
@@ -69,13 +71,15 @@ def _texture(folder: Path, value: str) -> tuple[NDArray[np.uint8] | None, str]:
     name = value.rsplit(maxsplit=1)[-1] if value.startswith("-") else value  # after options
     path = folder / name.replace("\\", "/")
     try:
+        if not path.is_file():
+            return None, f"texture {path.name!r} is not there: default colours"
         if path.stat().st_size > MOST_TEXTURE_BYTES:
-            return None, f"texture {path.name} is too large: left out"
+            return None, f"texture {path.name!r} is too large: left out"
         with warnings.catch_warnings(), Image.open(path) as image:
             warnings.simplefilter("ignore", Image.DecompressionBombWarning)
             if image.width * image.height > MOST_TEXELS:
-                return None, f"texture {path.name} is too large: left out"
+                return None, f"texture {path.name!r} is too large: left out"
             image.thumbnail((TEXTURE_SIZE, TEXTURE_SIZE))
             return np.array(image.convert("RGBA"), dtype=np.uint8), ""
     except (OSError, ValueError, SyntaxError, UnidentifiedImageError):
-        return None, f"texture {path.name} is not there or damaged: default colours"
+        return None, f"texture {path.name!r} is no image or damaged: default colours"

@@ -9,7 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from runtime.character import Material
-from runtime.characters.mesh_data import FileMesh, MeshError, check_counts, plain_material
+from runtime.characters.mesh_data import (
+    MOST_VERTICES,
+    FileMesh,
+    MeshError,
+    check_counts,
+    plain_material,
+)
 from runtime.characters.mtl_file import read_mtl
 from runtime.characters.palette import linear_from_srgb
 
@@ -24,7 +30,7 @@ class _Content:
         default_factory=list
     )
     face_material: list[int] = field(default_factory=list)
-    material_names: list[str] = field(default_factory=lambda: [""])
+    materials: dict[str, int] = field(default_factory=lambda: {"": 0})
     libraries: list[str] = field(default_factory=list)
     short_faces: int = 0
 
@@ -80,11 +86,11 @@ def _parsed(content: bytes) -> _Content:
                 read.face_material += [material] * (len(read.corners) - before)
             case "usemtl":
                 name = " ".join(words[1:])
-                if name not in read.material_names:
-                    read.material_names.append(name)
-                material = read.material_names.index(name)
+                material = read.materials.setdefault(name, len(read.materials))
             case "mtllib":
-                read.libraries.append(line.split(None, 1)[1].strip())
+                read.libraries.append(line.partition("mtllib")[2].strip())
+        if len(read.positions) > MOST_VERTICES:
+            raise MeshError(f"it has more than {MOST_VERTICES} vertices; reduce it first")
     return read
 
 
@@ -127,14 +133,14 @@ def _colors(rows: list[list[str]]) -> NDArray[np.float32] | None:
 
 
 def _materials(read: _Content, folder: Path) -> tuple[tuple[Material, ...], list[str]]:
-    """The materials by the order of `material_names`; a missing one is plain, and noted."""
+    """The materials in the order of `usemtl`; a missing one is plain, and noted."""
     library: dict[str, Material] = {}
     notes: list[str] = []
-    for name in read.libraries:
+    for name in dict.fromkeys(filter(None, read.libraries)):
         found, said = read_mtl(folder / name.replace("\\", "/"))
         library |= found
         notes += said
-    return tuple(library.get(name, plain_material()) for name in read.material_names), notes
+    return tuple(library.get(name, plain_material()) for name in read.materials), notes
 
 
 def _split(
