@@ -20,7 +20,7 @@ from runtime.characters.placement import (
     placed,
     placement_matrix,
 )
-from runtime.characters.upright import faces_away, surface_samples
+from runtime.characters.upright import faces_away, stands_along_z, surface_samples
 
 QUARTER = Rotation.from_euler("y", 90, degrees=True).as_matrix()
 
@@ -108,6 +108,14 @@ def test_a_sheet_shows_its_face_upright(thin: int) -> None:
 )
 def test_the_least_surfaces_have_samples(vertices: np.ndarray) -> None:
     assert np.isfinite(surface_samples(vertices, np.array([[0, 1, 2]]))).all()
+
+
+def test_a_snake_lies_as_it_lies() -> None:
+    angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
+    ring = np.column_stack([np.cos(angle), np.sin(angle)])
+    points = np.vstack([np.column_stack([ring, np.full(24, z)]) for z in np.linspace(0, 30, 60)])
+    assert not stands_along_z(points)
+    assert stands_along_z(points * [5.0, 1.0, 1.0])  # a board that wide does stand
 
 
 def test_a_line_of_a_surface_can_be_placed() -> None:
