@@ -81,12 +81,15 @@ class Director:
         """Whether enough of the driving joints are in view to strike a pose."""
         return bool(np.mean(frame.confidence[self._performer.joints] > 0.0) >= LEAST_SEEN)
 
-    def rehearse(self, poses: Sequence[Pose]) -> None:
+    def rehearse(self, poses: Sequence[Pose]) -> Array:
         """Let each puppet perform from the one of these poses that is most like it.
 
         A recorded performer cannot be asked to strike a pose, so the recording is looked through
         for one: its match is taken, and it is the rest state. The performer is seen facing the
         stage, whichever way the body had turned.
+
+        Returns:
+            (A, 2, 3) [m] for each puppet the corners of all that it fills in those poses.
         """
         view = self._view()
         states = [rest_state(pose, heading=0.0) for pose in poses]
@@ -96,6 +99,7 @@ class Director:
             mapping, rest = choices[int(np.argmax(worths))]
             puppet.take(mapping, rest, view, self._body(puppet, mapping, rest))
         self.matching = False
+        return np.array([puppet.rehearse(poses) for puppet in self._puppets])
 
     def direct(self, frame: SkeletonFrame) -> None:
         """While matching, show the best match of the newest pose; accept it in time."""
@@ -130,20 +134,23 @@ class Director:
                 f"{self._puppets[number].character.name} has {len(ranked)} matches with this part "
                 f"of the performer, so there is no --match {self._choices.rank}"
             )
-        return self._mapping(match)
+        return self._mapping(number, match)
 
     def _body(self, puppet: Puppet, mapping: Mapping, rest: Rest) -> Body:
         return body_of(mapping, self._performer.legs, rest.positions, puppet.tree.positions)
 
-    def _mapping(self, match: Match) -> Mapping:
+    def _mapping(self, number: int, match: Match) -> Mapping:
         chosen = match if self._choices.extend else match.stopped()
-        joints = self._performer.joints
-        drives = tuple(
-            Drive(tuple(joints[node] for node in source), target, self._choices.flip)
-            for source, target in chosen.pairs
-            if len(source) > 1 and len(target) > 1
-        )
-        return Mapping(drives, match.score, match.root)
+        joints, puppet = self._performer.joints, self._puppets[number]
+        drives = []
+        for pair, (nodes, matched) in enumerate(chosen.pairs):
+            source = tuple(joints[node] for node in nodes)
+            target = puppet.limb(matched) if pair < match.limbs else matched
+            if len(target) < len(matched):
+                source = self._performer.limb(source)
+            if len(source) > 1 and len(target) > 1:
+                drives.append(Drive(source, target, self._choices.flip))
+        return Mapping(tuple(drives), match.score, match.root)
 
     def accept(self) -> None:
         """Let the matches shown perform from now on; the pose just struck is the rest state."""

@@ -11,9 +11,11 @@ from devices.anatomy import (
     available_presets,
     heading_joints,
     hips_joint,
+    label_joints,
     source_joints,
     source_tree,
 )
+from devices.joint_names import Kind
 from devices.skeleton import Skeleton, SkeletonFrame
 from replay.fill import Filler
 from solvers.heading import heading, turned
@@ -89,6 +91,7 @@ class Performer:
         ]
         self._pairs = np.array(heading_joints(skeleton), dtype=np.int64).reshape(-1, 2)
         self._hips = hips_joint(skeleton)
+        self._parts = label_joints(skeleton)
         self._filler = Filler(skeleton)
         self._heading = 0.0
         self.pose: Pose | None = None
@@ -100,6 +103,14 @@ class Performer:
         self._heading = heading(positions, self._pairs, self._heading)
         self.pose = Pose(positions, filled.filled, self._heading, positions[self._hips])
         return self.pose
+
+    def limb(self, chain: tuple[int, ...]) -> tuple[int, ...]:
+        """Give an arm or a leg without the bone that joins it to the trunk, two joints at least."""
+        for start, joint in enumerate(chain[:-1]):
+            part = self._parts[joint]
+            if part is not None and part.kind in (Kind.UPPER_ARM, Kind.UPPER_LEG):
+                return chain[start:]
+        return chain
 
     def rest_tree(self) -> Tree:
         """The chosen joints as a tree, standing as the skeleton does at rest."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,10 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 STRAIGHT_ON = np.eye(3)  # how a capture device sees its performer
+MOST_STRETCH = 0.4  # of an edge at the 99th percentile, in a rehearsal
+REHEARSED_ITERATIONS = 4  # poses of a rehearsal lie far apart
+ROUNDS = 8  # of a rehearsal, at most
+LEAST_STEP = 0.9  # by which a limb is held back in a round
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,6 +68,12 @@ class Puppet:
     Args:
         character: who performs.
         iterations: ARAP iterations a frame.
+
+    Attributes:
+        tree: the character's nodes, hung on `root`.
+        root: the node that stays in place.
+        mapping: what drives it, or would.
+        gains: for each drive the share of the performer's turns that is carried over, in (0, 1].
     """
 
     def __init__(self, character: Character, *, iterations: int = 2) -> None:
@@ -89,7 +100,12 @@ class Puppet:
             character.vertices[self._binding.handles]
             - self.tree.positions[self._binding.pivot[self._binding.anchor]]
         )
+        self._edges = unique_edges(character.vertices, character.faces)
+        self._rest_lengths = np.linalg.norm(
+            np.diff(character.vertices[self._edges], axis=1)[:, 0], axis=1
+        )
         self.mapping = Mapping(())
+        self.gains = np.ones(0)
         self._retargets: list[tuple[list[int], ChainRetarget]] = []
         self._source_rest: Rest | None = None
         self.rest()
@@ -136,6 +152,7 @@ class Puppet:
             for drive in mapping.drives
         ]
         self.mapping = mapping
+        self.gains = np.ones(len(mapping.drives))
         self._source_rest = rest
         self._body = body
 
@@ -150,6 +167,68 @@ class Puppet:
         self._bone = np.where(self._parents[pivot] == node, pivot, node)
         self._bone[node == pivot] = -1
         self._retargets = []
+
+    def rehearse(self, poses: Sequence[Pose]) -> Array:
+        """Go through poses, holding back limbs whose surface cannot follow them.
+
+        A limb that has grown together with the body (an arm and its cape) would tear it when it
+        turns as far as the performer's. Its turns are made smaller, by the same share for the whole
+        show, until the surface is stretched no more than `MOST_STRETCH` at the 99th percentile.
+
+        Returns:
+            (2, 3) [m] least and greatest corner of all that it fills meanwhile, on the stage.
+        """
+        drive_of_edge = self._drives_of_edges()
+        for _ in range(ROUNDS):
+            boxes, stretches = zip(*(self._try(pose) for pose in poses), strict=True)
+            stretch = np.concatenate(stretches)
+            drives = np.tile(drive_of_edge, len(poses))
+            if np.percentile(stretch, 99.0) <= MOST_STRETCH:
+                break
+            self._hold_back(stretch, drives)
+        self._solver.reset()
+        for _, retarget in self._retargets:
+            retarget.reset()
+        corners = np.array(boxes)
+        return np.array([corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)])
+
+    def _try(self, pose: Pose) -> tuple[Array, Array]:
+        """Corners (2, 3) [m] and relative stretch (E,) of the edges in one pose."""
+        self.follow(pose)
+        vertices = self._solver.solve(self._targets(), iterations=REHEARSED_ITERATIONS)
+        lengths = np.linalg.norm(vertices[self._edges[:, 0]] - vertices[self._edges[:, 1]], axis=1)
+        seen = self._with_body(vertices).vertices
+        box = np.array([seen.min(axis=0), seen.max(axis=0)])
+        return box, np.abs(lengths / self._rest_lengths - 1.0)
+
+    def _hold_back(self, stretch: Array, drives: Indices) -> None:
+        tight = [
+            float(np.percentile(stretch[drives == number], 99.0, method="lower"))
+            if (drives == number).any()
+            else 0.0
+            for number in range(len(self.gains))
+        ]
+        if max(tight) <= MOST_STRETCH:  # the fault lies where no limb is, so with all of them
+            self.gains *= LEAST_STEP
+            return
+        shares = np.clip(MOST_STRETCH / np.maximum(tight, MOST_STRETCH), 0.75, 1.0)
+        self.gains *= np.where(shares < 1.0, np.minimum(shares, LEAST_STEP), 1.0)
+
+    def _drives_of_edges(self) -> Indices:
+        """Which drive moves each edge (E,), -1 for none."""
+        drive_of_node = np.full(len(self.tree), -1, dtype=np.int64)
+        for number, chain in enumerate(self._chains):
+            drive_of_node[list(chain[1:])] = number
+        drive_of_vertex = drive_of_node[self._binding.node][self._binding.owner]
+        found: Indices = drive_of_vertex[self._edges].max(axis=1)
+        return found
+
+    def limb(self, chain: tuple[int, ...]) -> tuple[int, ...]:
+        """Give the part of a chain of nodes that lies outside the trunk, two nodes at least."""
+        start = 0
+        while start + 2 < len(chain) and self._binding.inside[chain[start + 1]]:
+            start += 1
+        return chain[start:]
 
     def show(self, mapping: Mapping) -> None:
         """Say what would drive it, without being driven."""
@@ -171,7 +250,10 @@ class Puppet:
         rest = self._source_rest
         joints = pose.facing(rest.heading)
         self._pose_nodes(
-            [retarget.rotations(joints[source]) for source, retarget in self._retargets]
+            [
+                scaled(retarget.rotations(joints[source]), gain)
+                for (source, retarget), gain in zip(self._retargets, self.gains, strict=True)
+            ]
         )
         self._turn = pose.heading - rest.heading if self._body.turns else 0.0
         self._lift = self._body.lift * float(pose.hips[1] - rest.height)
@@ -262,3 +344,22 @@ def _length(drives: list[Drive], target: Array, source: Array) -> float:
     ours = sum(total(target, drive.target) for drive in drives)
     theirs = sum(total(source, drive.source) for drive in drives)
     return ours / theirs if theirs > 0.0 else 0.0
+
+
+def scaled(rotations: Array, share: float) -> Array:
+    """Quaternions (n, 4) with their angles, up to a whole turn, made smaller by `share`."""
+    if share == 1.0:
+        return rotations
+    sine = np.linalg.norm(rotations[:, :3], axis=1, keepdims=True)
+    half = np.arctan2(sine, rotations[:, 3:])
+    axis = rotations[:, :3] / np.maximum(sine, 1e-300)
+    return np.hstack([np.sin(share * half) * axis, np.cos(share * half)])
+
+
+def unique_edges(vertices: Array, faces: Indices) -> Indices:
+    """Every edge (E, 2) that has a length, once."""
+    sides = np.sort(np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
+    edges = np.unique(sides, axis=0)
+    lengths = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
+    kept: Indices = edges[lengths > 1e-12]
+    return kept

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from replay.recording import Recording
 from runtime.director import Director
 from runtime.performer import Performer
 
-POSES = 48  # looked at, evenly through the recording
+Array = NDArray[np.float64]
+
+POSES = 32  # looked at, evenly through the recording
 
 
-def rehearse(recording: Recording, source: str, director: Director) -> None:
+def rehearse(recording: Recording, source: str, director: Director) -> Array | None:
     """Let the director choose matches and rest states from poses of the whole recording.
 
     Where hardly a joint is ever in view nothing is chosen; the director then matches as it would
@@ -21,6 +24,10 @@ def rehearse(recording: Recording, source: str, director: Director) -> None:
         recording: what will be played.
         source: the part of the performer that drives, as for `Performer`.
         director: who chooses.
+
+    Returns:
+        (A, 2, 3) [m] for each puppet the corners of all that it fills, for the camera; None when
+        nothing was chosen.
     """
     lead = np.flatnonzero(recording.performers == recording.performers[0])
     chosen = np.unique(lead[np.linspace(0, len(lead) - 1, POSES).round().astype(int)])
@@ -31,5 +38,4 @@ def rehearse(recording: Recording, source: str, director: Director) -> None:
         pose = performer.follow(frame)
         if director.sees(frame):
             poses.append(pose)
-    if poses:
-        director.rehearse(poses)
+    return director.rehearse(poses) if poses else None

@@ -59,12 +59,24 @@ class Theatre:
         self.camera = front_camera()
         self.frame_all()
 
-    def frame_all(self) -> None:
-        """Move the camera to where every character is in view, with room to move."""
+    def frame_all(self, filled: NDArray[np.float64] | None = None) -> None:
+        """Move the camera to where every character is in view, with room to move.
+
+        Args:
+            filled: (A, 2, 3) [m] what each puppet is known to fill in the show, in its own
+                coordinates; a guess from the rest poses when None.
+        """
         boxes = self.stage.boxes
-        room = ROOM * np.ptp(boxes, axis=1).max(axis=1)[:, None]
-        boxes[:, 0, ::2] -= room
-        boxes[:, 1] += room
+        if filled is None:
+            room = ROOM * np.ptp(boxes, axis=1).max(axis=1)[:, None]
+            boxes[:, 0, ::2] -= room
+            boxes[:, 1] += room
+        else:
+            places = np.array([actor.position for actor in self._actors])[:, None]
+            moved = filled + places
+            boxes = np.stack(
+                [np.minimum(boxes[:, 0], moved[:, 0]), np.maximum(boxes[:, 1], moved[:, 1])], axis=1
+            )
         self.camera = self.camera.frame(boxes, self.stage.aspect)
 
     def show(self, pose: Pose | None, motions: Sequence[Motion]) -> None:

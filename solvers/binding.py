@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from solvers.limbs import bones_in_trunk, closest_bones, limbs
+
 RING = 10  # handles of one anchor: enough to fix its turn and its cross-section
 SPACING = 0.9  # least distance between anchors of a limb, in radii of that limb
-BODY = 0.8  # share of a branching's own radius that stays free of the limbs' anchors
 TUBE = 1.2  # length of limb that one anchor on a long bone keeps straight, in radii
 SMALL = 0.25  # a loose component under this share of the whole is carried rigidly
 
@@ -36,12 +37,16 @@ class Binding:
         node: (A,) int; the node at the far end of the anchor's bone, or the branch node itself.
         pivot: (A,) int; the node about which the anchor turns: the bone's near end, or the
             branch node itself.
+        inside: (K,) bool; whether the bone that ends at each node lies inside the trunk.
+        owner: (N,) int; the anchor that each vertex is nearest to along its own limb.
     """
 
     handles: Indices
     anchor: Indices
     node: Indices
     pivot: Indices
+    inside: NDArray[np.bool_]
+    owner: Indices
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -52,60 +57,12 @@ class _Anchor:
     pivot: int
 
 
-def closest_bones(
-    vertices: Array, parents: Indices, positions: Array
-) -> tuple[Indices, Array, Array]:
-    """Find the bone nearest to each vertex.
-
-    Args:
-        vertices: (N, 3) [m].
-        parents: (K,) parent of each node, -1 at the root.
-        positions: (K, 3) [m] rest positions of the nodes.
-
-    Returns:
-        (N,) the node at the far end of the nearest bone (the root where there is no bone), (N,)
-        the distance to it [m], (N,) how far along the bone, from 0 at the parent to 1.
-    """
-    count = len(vertices)
-    best = np.full(count, int(np.flatnonzero(parents < 0)[0]), dtype=np.int64)
-    distance = np.full(count, np.inf)
-    along = np.ones(count)
-    if len(parents) == 1:
-        return best, np.linalg.norm(vertices - positions[0], axis=1), along
-    for node in np.flatnonzero(parents >= 0):
-        start = positions[parents[node]]
-        bone = positions[node] - start
-        offset = vertices - start
-        share = np.clip(offset @ bone / max(float(bone @ bone), 1e-30), 0.0, 1.0)
-        gap = np.linalg.norm(offset - share[:, None] * bone, axis=1)
-        nearer = gap < distance
-        best[nearer], distance[nearer], along[nearer] = node, gap[nearer], share[nearer]
-    return best, distance, along
-
-
-def _limbs(parents: Indices) -> list[list[int]]:
-    """Chains of nodes between branchings, root and leaves, each from its root side outward."""
-    degree = np.bincount(parents[parents >= 0], minlength=len(parents))  # children of each node
-    limbs = []
-    for node in range(len(parents)):
-        if degree[node] == 1 and parents[node] >= 0:
-            continue
-        chain = [node]
-        while parents[chain[-1]] >= 0:
-            chain.append(int(parents[chain[-1]]))
-            if degree[chain[-1]] != 1 or parents[chain[-1]] < 0:
-                break
-        if len(chain) > 1:
-            limbs.append(chain[::-1])
-    return limbs
-
-
 def _limb_anchors(
-    limb: list[int], positions: Array, radius: float, body: float, ends_at_leaf: bool
+    limb: list[int], positions: Array, radius: float, inside: NDArray[np.bool_]
 ) -> list[_Anchor]:
-    """Anchors of one limb, `body` [m] of its start left free, `SPACING` radii apart."""
+    """Anchors of one limb's bones outside the trunk, `SPACING` radii apart."""
     anchors: list[_Anchor] = []
-    travelled, last = 0.0, body - SPACING * radius
+    travelled, last = 0.0, -np.inf
     for pivot, node in itertools.pairwise(limb):
         bone = positions[node] - positions[pivot]
         length = float(np.linalg.norm(bone))
@@ -113,44 +70,48 @@ def _limb_anchors(
             continue
         parts = int(np.clip(round(length / max(TUBE * radius, 1e-12)), 1, 3))
         for share in (np.arange(parts) + 0.5) / parts:
-            if travelled + share * length >= last + SPACING * radius:
-                last = travelled + share * length
+            at = travelled + share * length
+            if at >= last + SPACING * radius and not inside[node]:
+                last = at
                 anchors.append(_Anchor(positions[pivot] + share * bone, bone / length, node, pivot))
         travelled += length
-    if ends_at_leaf and len(limb) > 1:
-        tip, pivot = limb[-1], limb[-2]
-        bone = positions[tip] - positions[pivot]
-        length = float(np.linalg.norm(bone))
-        if anchors and travelled - last < SPACING * radius and len(anchors) > 1:
-            anchors.pop()
-        tangent = bone / length if length > 0.0 else np.zeros(3)
-        anchors.append(_Anchor(positions[tip], tangent, tip, pivot))
     return anchors
 
 
+def _with_tip(anchors: list[_Anchor], limb: list[int], positions: Array, radius: float) -> None:
+    """Let a limb's tip be held, in place of a last anchor that stands too near."""
+    tip, pivot = limb[-1], limb[-2]
+    bone = positions[tip] - positions[pivot]
+    length = float(np.linalg.norm(bone))
+    near = anchors and np.linalg.norm(positions[tip] - anchors[-1].point) < SPACING * radius
+    if near and len(anchors) > 1:
+        anchors.pop()
+    tangent = bone / length if length > 0.0 else np.zeros(3)
+    anchors.append(_Anchor(positions[tip], tangent, tip, pivot))
+
+
 def _place_anchors(
-    parents: Indices, positions: Array, nearest: Indices, distance: Array
+    parents: Indices,
+    positions: Array,
+    nearest: Indices,
+    distance: Array,
+    inside: NDArray[np.bool_],
 ) -> list[_Anchor]:
     children = np.bincount(parents[parents >= 0], minlength=len(parents))
     root = int(np.flatnonzero(parents < 0)[0])
     overall = float(np.median(distance)) if len(distance) else 1.0
-
-    def radius_of(nodes: list[int]) -> float:
-        around = distance[np.isin(nearest, nodes)]
-        return float(np.median(around)) if len(around) else overall
-
-    anchors = []
-    body: dict[int, float] = {}
-    for node in range(len(parents)):
-        if children[node] > 1 or node == root:
-            around = [node, *np.flatnonzero(parents == node).tolist()]
-            body[node] = radius_of(around)
-            anchors.append(_Anchor(positions[node], np.zeros(3), node, node))
-    for limb in _limbs(parents):
-        radius = radius_of(limb[1:])
-        free = BODY * max(body.get(limb[0], 0.0), radius)
-        leaf = bool(children[limb[-1]] == 0)
-        anchors.extend(_limb_anchors(limb, positions, radius, free, leaf))
+    anchors = [
+        _Anchor(positions[node], np.zeros(3), node, node)
+        for node in range(len(parents))
+        if children[node] > 1 or node == root
+    ]
+    for limb in limbs(parents):
+        around = distance[np.isin(nearest, limb[1:])]
+        radius = float(np.median(around)) if len(around) else overall
+        ours = _limb_anchors(limb, positions, radius, inside)
+        if children[limb[-1]] == 0:
+            _with_tip(ours, limb, positions, radius)
+        anchors.extend(ours)
     return anchors
 
 
@@ -217,10 +178,11 @@ def bind(
         bone_of_vertex: (N,) the node at the far end of the bone that each vertex belongs to, as
             a rig's weights say; the nearest bone when None.
     """
-    nearest, distance, _ = closest_bones(vertices, parents, positions)
+    nearest, distance = closest_bones(vertices, parents, positions)
     if bone_of_vertex is not None:
         nearest = bone_of_vertex
-    anchors = _place_anchors(parents, positions, nearest, distance)
+    inside = bones_in_trunk(vertices, faces, parents, positions)
+    anchors = _place_anchors(parents, positions, nearest, distance, inside)
     points = np.array([anchor.point for anchor in anchors])
     owner = _owners(vertices, nearest, parents, anchors, points)
     handles: list[int] = []
@@ -238,6 +200,8 @@ def bind(
         anchor=np.array(groups, dtype=np.int64),
         node=np.array([anchor.node for anchor in anchors], dtype=np.int64),
         pivot=np.array([anchor.pivot for anchor in anchors], dtype=np.int64),
+        inside=inside,
+        owner=owner,
     )
 
 
@@ -250,7 +214,7 @@ def _owners(
 ) -> Indices:
     """The anchor nearest to each vertex among those of its own limb, of all where it has none."""
     limb_of_node = np.full(len(parents), -1, dtype=np.int64)
-    for number, limb in enumerate(_limbs(parents)):
+    for number, limb in enumerate(limbs(parents)):
         limb_of_node[limb[1:]] = number
     limb_of_anchor = np.array([limb_of_node[anchor.node] for anchor in anchors])
     branching = np.array([anchor.node == anchor.pivot for anchor in anchors])

@@ -132,7 +132,9 @@ class _Show:
         self._closing.callback(self._tell, loop)
         recording = self._source.recording
         if recording is not None:
-            rehearse(recording, self._options.source, self._director)
+            filled = rehearse(recording, self._options.source, self._director)
+            if self._theatre is not None:
+                self._theatre.frame_all(filled)
         total = None if recording is None or self._options.loop else len(recording)
         progress = self._closing.enter_context(Progress("performing", total))
         controls = None
