@@ -28,7 +28,7 @@ def read_mesh_file(path: Path) -> FileMesh:
     """
     content = file_content(path)
     try:
-        return _checked(_read(path, content))
+        return checked(_read(path, content))
     except MeshError as error:
         raise InputError(f"{path}: {error}") from None
 
@@ -68,8 +68,12 @@ def _read(path: Path, content: bytes) -> FileMesh:
             return read_medit(content)
 
 
-def _checked(mesh: FileMesh) -> FileMesh:
-    """The mesh with unknown colours replaced, or a MeshError for what cannot be deformed."""
+def checked(mesh: FileMesh) -> FileMesh:
+    """The mesh with unknown colours replaced.
+
+    Raises:
+        MeshError: it has no faces, too many, none with an extent, or names what is not there.
+    """
     check_counts(len(mesh.vertices), len(mesh.faces))
     if mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices):
         raise MeshError(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
@@ -34,6 +34,15 @@ def weld(vertices: NDArray[np.float64]) -> NDArray[np.int64]:
 def first_occurrences(groups: NDArray[np.int64]) -> NDArray[np.int64]:
     """The file vertex (N,) that each welded vertex of `weld` is first met as."""
     return np.asarray(np.unique(groups, return_index=True)[1], dtype=np.int64)
+
+
+def welded_weights(weights: csr_array, groups: NDArray[np.int64]) -> csr_array:
+    """The weights (N, K) of welded vertices: the mean of what (M, K) says of those made one."""
+    count = np.bincount(groups)
+    mean = csr_array(
+        (1.0 / count[groups], (groups, np.arange(len(groups)))), shape=(len(count), len(groups))
+    )
+    return csr_array(mean @ weights)
 
 
 def _groups_within(positions: NDArray[np.float64], reach: float) -> NDArray[np.int64]:

@@ -8,13 +8,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
+from scipy.sparse import csr_array
 
 from devices.errors import InputError
 from runtime.characters.load import SUFFIXES, load_character
 from runtime.characters.mesh_data import FileMesh
 from runtime.characters.mesh_file import MESH_SUFFIXES, read_mesh_file
 from runtime.characters.palette import linear_from_srgb, palette_color
-from runtime.characters.weld import first_occurrences, weld
+from runtime.characters.weld import first_occurrences, weld, welded_weights
 
 TETRAHEDRON = np.array([[0.0, 0, 0], [2, 0, 0], [0, 3, 0], [0, 0, 1.5]])
 FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
@@ -310,6 +311,12 @@ def test_welding_undoes_splitting_at_any_scale_and_order(seed: int, exponent: fl
         groups[:, None] == groups[None, :], copies[:, None] == copies[None, :]
     )
     assert (np.diff(first_occurrences(groups)) > 0).all()
+
+
+def test_weights_of_welded_vertices_are_the_mean_of_theirs() -> None:
+    weights = csr_array([[1.0, 0.0, 0.0], [0.0, 0.5, 0.5], [0.5, 0.5, 0.0]])
+    welded = welded_weights(weights, np.array([0, 1, 0]))
+    np.testing.assert_allclose(welded.toarray(), [[0.75, 0.25, 0.0], [0.0, 0.5, 0.5]])
 
 
 def test_many_vertices_in_one_spot_far_from_another_stay_cheap() -> None:
