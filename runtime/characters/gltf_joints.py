@@ -1,0 +1,189 @@
+"""From the joints of a glTF file's skins to one skeleton of those that move something."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from devices.skeleton import Skeleton
+from runtime.characters.gltf_scene import Scene
+
+Array = NDArray[np.float64]
+_COINCIDENT = 1e-4
+"""Joints nearer than this fraction of the rig's extent stand at the same place."""
+_STEM = 1e-2
+"""A root nearer to the scene's origin than this fraction of the rig's extent stands on it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rig:
+    """A skeleton, and which of its joints each node of the scene moves with.
+
+    Attributes:
+        skeleton: in scene coordinates.
+        joint_of: (n,) the joint that each of the scene's n nodes became; -1 for the others.
+    """
+
+    skeleton: Skeleton
+    joint_of: NDArray[np.int64]
+
+
+def with_connections(scene: Scene, joints: Iterable[int]) -> set[int]:
+    """The joints and the nodes between each of them and those above it."""
+    named = set(joints)
+    result = set(named)
+    for joint in named:
+        above = scene.ancestors(joint)
+        highest = max((i for i, node in enumerate(above) if node in named), default=-1)
+        result.update(above[: highest + 1])
+    return result
+
+
+def build_rig(
+    scene: Scene, joints: set[int], weight: Array, names: list[str], *, moving: bool
+) -> Rig:
+    """One skeleton of `joints`, closed under `with_connections`.
+
+    Joints at the place of their parent become one with it; those that move nothing are left out,
+    but for one that ends a bone; several roots hang on the node above them all, or on a new one.
+
+    Args:
+        scene: the node tree.
+        joints: node indices.
+        weight: (n,) how much of the surface each node moves.
+        names: n node names.
+        moving: whether there is a surface at all, so that a joint without weight moves nothing.
+    """
+    positions = scene.positions
+    reach = float(np.linalg.norm(np.ptp(positions[sorted(joints)], axis=0)))
+    tree = _Tree.of(scene, joints, weight, names)
+    tree.merge_coincident(positions, _COINCIDENT * reach)
+    if moving:
+        tree.drop_idle(positions)
+    tree.drop_stem(positions, _STEM * reach, moving=moving)
+    roots = [joint for joint, parent in tree.parent.items() if parent < 0]
+    if len(roots) > 1:
+        above = _above_all(scene, roots)
+        if above is None:
+            above = len(positions)
+            tree.names.append("root")
+            positions = np.vstack([positions, positions[roots].mean(axis=0)])
+        tree.join(roots, above)
+    return tree.rig(positions, len(scene.parents))
+
+
+def _above_all(scene: Scene, nodes: list[int]) -> int | None:
+    common = scene.ancestors(nodes[0])
+    for node in nodes[1:]:
+        among = set(scene.ancestors(node))
+        common = [other for other in common if other in among]
+    return common[0] if common else None
+
+
+class _Tree:
+    """Joints being pruned.
+
+    Attributes:
+        parent: each joint's parent joint, -1 for roots; parents come before their children.
+        names: of all nodes.
+        became: the joint that each joint merged away moves with.
+        weight: how much each node moves.
+    """
+
+    def __init__(self, parent: dict[int, int], weight: Array, names: list[str]) -> None:
+        self.parent = parent
+        self.names = list(names)
+        self.became: dict[int, int] = {}
+        self.weight = weight.copy()
+
+    @classmethod
+    def of(cls, scene: Scene, joints: set[int], weight: Array, names: list[str]) -> _Tree:
+        above = {joint: scene.ancestors(joint) for joint in joints}
+        parent: dict[int, int] = {}
+        for joint in sorted(joints, key=lambda joint: (len(above[joint]), joint)):
+            parent[joint] = next((node for node in above[joint] if node in joints), -1)
+        return cls(parent, weight, names)
+
+    def children(self) -> dict[int, list[int]]:
+        below: dict[int, list[int]] = {joint: [] for joint in self.parent}
+        for joint, parent in self.parent.items():
+            if parent >= 0:
+                below[parent].append(joint)
+        return below
+
+    def merge_coincident(self, positions: Array, reach: float) -> None:
+        """Make each joint at the place of its parent one with it, under the busier one's name."""
+        for joint in list(self.parent):
+            parent = self.became.get(self.parent[joint], self.parent[joint])
+            self.parent[joint] = parent
+            if parent < 0 or np.linalg.norm(positions[joint] - positions[parent]) > reach:
+                continue
+            if self.weight[joint] > self.weight[parent]:
+                self.names[parent] = self.names[joint]
+            self.weight[parent] += self.weight[joint]
+            self.became[joint] = parent
+            del self.parent[joint]
+
+    def drop_idle(self, positions: Array) -> None:
+        """Drop what moves nothing, below it neither, but for the farthest end of each bone."""
+        below = self.children()
+        busy: dict[int, bool] = {}
+        for joint in reversed(list(self.parent)):
+            busy[joint] = self.weight[joint] > 0.0 or any(busy[child] for child in below[joint])
+        keep = {joint for joint in self.parent if busy[joint]}
+        for joint in list(keep):
+            if below[joint] and not any(busy[child] for child in below[joint]):
+                reach = np.linalg.norm(positions[below[joint]] - positions[joint], axis=1)
+                keep.add(below[joint][int(np.argmax(reach))])
+        self.parent = {joint: self.parent[joint] for joint in self.parent if joint in keep}
+
+    def drop_stem(self, positions: Array, reach: float, *, moving: bool) -> None:
+        """Drop roots that only place the rig in the scene: one child, and nothing that they move.
+
+        Where nothing is known to move, it is one that stands at the scene's origin.
+        """
+        below = self.children()
+        for root in [joint for joint, parent in self.parent.items() if parent < 0]:
+            joint = root
+            while len(below[joint]) == 1 and below[below[joint][0]]:
+                places = float(np.linalg.norm(positions[joint])) <= reach
+                if self.weight[joint] > 0.0 if moving else not places:
+                    break
+                del self.parent[joint]
+                joint = below[joint][0]
+                self.parent[joint] = -1
+
+    def join(self, roots: list[int], above: int) -> None:
+        """Hang the roots on a new root."""
+        self.parent = {above: -1} | self.parent | dict.fromkeys(roots, above)
+
+    def rig(self, positions: Array, nodes: int) -> Rig:
+        """The skeleton of the joints that are left, and the joint of each of the scene's nodes."""
+        joints = list(self.parent)
+        place = {joint: number for number, joint in enumerate(joints)}
+        joint_of = np.full(nodes, -1, dtype=np.int64)
+        for joint, number in place.items():
+            if joint < nodes:
+                joint_of[joint] = number
+        for joint, heir in self.became.items():
+            joint_of[joint] = place.get(heir, -1)
+        parents = [place.get(self.parent[joint], -1) for joint in joints]
+        names = unique_names([self.names[joint] for joint in joints])
+        return Rig(Skeleton(names, np.array(parents), positions[joints]), joint_of)
+
+
+def unique_names(names: list[str]) -> tuple[str, ...]:
+    """The names, those that occurred before with a number behind them."""
+    taken = set(names)
+    seen: set[str] = set()
+    result: list[str] = []
+    for name in names:
+        fresh, number = name, 2
+        while fresh in seen or (fresh != name and fresh in taken):
+            fresh, number = f"{name}.{number}", number + 1
+        seen.add(fresh)
+        result.append(fresh)
+    return tuple(result)
