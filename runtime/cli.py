@@ -99,6 +99,9 @@ def _add_show_options(parser: argparse.ArgumentParser) -> None:
     )
     keep = parser.add_argument_group("what is kept")
     keep.add_argument("--video", type=Path, metavar="OUT.mp4")
+    keep.add_argument(
+        "--fps", type=positive, default=60.0, metavar="X", help="of the video, at most"
+    )
     keep.add_argument("--frames", type=Path, metavar="DIR", help="a PNG for each frame")
     keep.add_argument("--cache", type=Path, metavar="OUT.pc2", help="deformed vertices, for each")
     keep.add_argument("--report", type=Path, metavar="OUT.json", help="the show in figures")
@@ -149,6 +152,7 @@ def parser() -> argparse.ArgumentParser:
     )
     _characters(demo, required=False)
     _add_show_options(demo)
+    demo.set_defaults(fps=30.0)
 
     replay = add("replay", _command("show", "replay"), "a recorded stream drives a character")
     replay.add_argument("recording", type=Path, metavar="RECORDING")

@@ -6,6 +6,7 @@ and of GL while a performance runs.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Protocol
 
@@ -19,6 +20,8 @@ from runtime.output.report import Report
 from runtime.performer import Performer, Pose
 from runtime.puppet import Motion, Puppet
 from runtime.theatre import Theatre
+
+EARLY = 0.75  # of the wanted step between pictures; frames never come quite evenly
 
 
 class Recorder(Protocol):
@@ -73,6 +76,9 @@ class FrameLoop:
         self._outputs = outputs
         self._recorder = recorder
         self._shown = shown
+        rate = max((o.pictures_a_second for kept in outputs for o in kept), default=0.0)
+        self._picture_step = EARLY / rate if rate > 0.0 else math.inf  # [s]
+        self._pictured = -math.inf
         self._lead = Lead()
         self._timer = StageTimer()
         self._pose: Pose | None = None
@@ -129,12 +135,14 @@ class FrameLoop:
         self.frames += 1
 
     def _publish(self, time: float) -> None:
-        needs_picture = any(output.needs_picture for kept in self._outputs for output in kept)
+        wanted = time - self._pictured >= self._picture_step
         picture = None
         with self._timer.stage("render"):
-            if self._theatre is not None and (self._shown or needs_picture):
+            if self._theatre is not None and (self._shown or wanted):
                 self._theatre.show(self._pose, self._motions)
-                picture = self._theatre.picture() if needs_picture else None
+            if self._theatre is not None and wanted:
+                picture = self._theatre.picture()
+                self._pictured = time
         with self._timer.stage("publish"):
             for motion, kept in zip(self._motions, self._outputs, strict=True):
                 performed = PerformedFrame(

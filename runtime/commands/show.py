@@ -171,7 +171,11 @@ class _Show:
                 kept.append(self._closing.enter_context(open_export(path, character, rate=rate)))
             outputs.append(kept)
         if options.video is not None:
-            outputs[0].append(self._closing.enter_context(Video(options.video, rate=rate)))
+            outputs[0].append(
+                self._closing.enter_context(
+                    Video(options.video, rate=rate, pictures_a_second=options.fps)
+                )
+            )
         if options.frames is not None:
             outputs[0].append(self._closing.enter_context(Frames(options.frames)))
         return outputs
@@ -180,7 +184,7 @@ class _Show:
         """The house, if anybody looks."""
         if self._window is not None:
             context, size = self._window.context, self._window.size
-        elif any(output.needs_picture for kept in self._outputs for output in kept):
+        elif any(output.pictures_a_second > 0.0 for kept in self._outputs for output in kept):
             context, size = headless_context(), self._options.size
             self._closing.callback(release_headless, context)
         else:

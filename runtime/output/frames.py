@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 from typing import Self
@@ -31,7 +32,7 @@ class Frames:
         InputError: the folder cannot be made or written to.
     """
 
-    needs_picture = True
+    pictures_a_second = math.inf
 
     def __init__(self, folder: Path) -> None:
         if folder.exists() and not folder.is_dir():

@@ -64,7 +64,7 @@ class GltfExport:
         InputError: another suffix, or the file cannot be written.
     """
 
-    needs_picture = False
+    pictures_a_second = 0.0
 
     def __init__(self, path: Path, character: Character) -> None:
         check_suffix(path, (".glb",))

@@ -21,7 +21,7 @@ class PerformedFrame:
         node_rotations: (K, 4) unit quaternions (x, y, z, w), world, of each node since its rest
             pose: all of them (0, 0, 0, 1) at rest.
         picture: (H, W, 4) uint8 sRGB with straight alpha, top row first, or None when nobody needs
-            pictures.
+            one of this frame.
     """
 
     index: int
@@ -41,8 +41,8 @@ class Output(Protocol):
     """
 
     @property
-    def needs_picture(self) -> bool:
-        """Whether frames must come with their picture."""
+    def pictures_a_second(self) -> float:
+        """How many frames in a second must come with their picture: 0 none, infinite all."""
         ...
 
     def write(self, frame: PerformedFrame) -> None:

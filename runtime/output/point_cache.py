@@ -37,7 +37,7 @@ class PointCache:
         InputError: the file cannot be written.
     """
 
-    needs_picture = False
+    pictures_a_second = 0.0
 
     def __init__(self, path: Path, character: Character) -> None:
         check_writable(path)

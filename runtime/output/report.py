@@ -38,7 +38,7 @@ class Part:
         frames: performed frames so far.
     """
 
-    needs_picture = False
+    pictures_a_second = 0.0
 
     def __init__(self, character: Character) -> None:
         self.frames = 0

@@ -34,7 +34,7 @@ class UsdExport:
         InputError: another suffix, usd-core is missing, or the file cannot be written.
     """
 
-    needs_picture = False
+    pictures_a_second = 0.0
 
     def __init__(self, path: Path, character: Character, *, rate: float = 30.0) -> None:
         self._suffix = check_suffix(path, (".usda", ".usdc"))

@@ -46,7 +46,7 @@ _ENCODERS: dict[str, dict[str, dict[str, str]]] = {
 
 
 class Video:
-    """Writes H.264 (VP9 for ``.webm``), 4:2:0, BT.709, every frame exactly once at its own time.
+    """Writes H.264 (VP9 for ``.webm``), 4:2:0, BT.709, every picture exactly once at its own time.
 
     The frame rate is variable: each frame keeps the time it was performed at, so a recording with
     gaps or jitter plays with its own timing. An odd side grows by one pixel, its edge repeated;
@@ -60,14 +60,14 @@ class Video:
         path: ends in .mp4, .m4v, .mov, .mkv or .webm.
         rate: about how many frames a second will come; a hint, and how long the last frame is
             shown when it is the only one.
+        pictures_a_second: how many it asks for; a frame without a picture is left out.
 
     Raises:
         InputError: another suffix, PyAV or an encoder is missing, or the file cannot be written.
     """
 
-    needs_picture = True
-
-    def __init__(self, path: Path, *, rate: float = 30.0) -> None:
+    def __init__(self, path: Path, *, rate: float = 30.0, pictures_a_second: float = 60.0) -> None:
+        self.pictures_a_second = pictures_a_second
         encoders = _ENCODERS[check_suffix(path, tuple(_ENCODERS))]
         check_writable(path)
         self._av = _import_av(path)
@@ -85,13 +85,13 @@ class Video:
             )
 
     def write(self, frame: PerformedFrame) -> None:
-        """Encode one picture.
+        """Encode the frame's picture, if it has one.
 
         Raises:
             InputError: the disk fails.
         """
         if frame.picture is None:
-            raise ValueError("Expected `picture` with every frame, got None")
+            return
         if self._container is None:
             raise ValueError("the video is closed")
         picture = _even(_opaque(frame.picture))
