@@ -136,7 +136,7 @@ class GltfFile:
         values = self._elements(accessor, kinds)
         result = values.astype(np.float64)
         if accessor.flag("normalized") and values.dtype.kind in "iu":
-            result = np.maximum(result / np.iinfo(values.dtype).max, -1.0)
+            result = np.maximum(result / np.iinfo(values.dtype.str).max, -1.0)
         return result
 
     def wholes(self, index: int, kind: str) -> NDArray[np.int64]:

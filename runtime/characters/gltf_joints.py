@@ -14,7 +14,7 @@ from runtime.characters.gltf_scene import Scene
 Array = NDArray[np.float64]
 _COINCIDENT = 1e-4
 """Joints nearer than this fraction of the rig's extent stand at the same place."""
-_STEM = 1e-2
+_STEM = 0.05
 """A root nearer to the scene's origin than this fraction of the rig's extent stands on it."""
 
 
@@ -48,7 +48,8 @@ def build_rig(
     """One skeleton of `joints`, closed under `with_connections`.
 
     Joints at the place of their parent become one with it; those that move nothing are left out,
-    but for one that ends a bone; several roots hang on the node above them all, or on a new one.
+    but for one that ends a bone; several roots hang on the node above them all, or, where that only
+    places the rig in the scene, on the nearest joint of the largest tree.
 
     Args:
         scene: the node tree.
@@ -64,14 +65,13 @@ def build_rig(
     if moving:
         tree.drop_idle(positions)
     tree.drop_stem(positions, _STEM * reach, moving=moving)
-    roots = [joint for joint, parent in tree.parent.items() if parent < 0]
+    roots = tree.roots()
     if len(roots) > 1:
         above = _above_all(scene, roots)
-        if above is None:
-            above = len(positions)
-            tree.names.append("root")
-            positions = np.vstack([positions, positions[roots].mean(axis=0)])
-        tree.join(roots, above)
+        if above is None or tree.places(above, positions, _STEM * reach):
+            tree.graft(positions)
+        else:
+            tree.join(roots, above)
     return tree.rig(positions, len(scene.parents))
 
 
@@ -140,21 +140,44 @@ class _Tree:
                 keep.add(below[joint][int(np.argmax(reach))])
         self.parent = {joint: self.parent[joint] for joint in self.parent if joint in keep}
 
-    def drop_stem(self, positions: Array, reach: float, *, moving: bool) -> None:
-        """Drop roots that only place the rig in the scene: one child, and nothing that they move.
+    def roots(self) -> list[int]:
+        """The joints without a parent."""
+        return [joint for joint, parent in self.parent.items() if parent < 0]
 
-        Where nothing is known to move, it is one that stands at the scene's origin.
+    def places(self, joint: int, positions: Array, reach: float) -> bool:
+        """Whether a joint only places the rig in the scene: it stands on its origin, idle."""
+        return self.weight[joint] == 0.0 and float(np.linalg.norm(positions[joint])) <= reach
+
+    def drop_stem(self, positions: Array, reach: float, *, moving: bool) -> None:
+        """Drop roots that are no part of the body.
+
+        Those with one child, if they move nothing; with several, if they only place the rig. Where
+        nothing is known to move, those with one child that only place the rig.
         """
         below = self.children()
-        for root in [joint for joint, parent in self.parent.items() if parent < 0]:
-            joint = root
-            while len(below[joint]) == 1 and below[below[joint][0]]:
-                places = float(np.linalg.norm(positions[joint])) <= reach
-                if self.weight[joint] > 0.0 if moving else not places:
-                    break
+        waiting = self.roots()
+        for joint in waiting:
+            idle = self.weight[joint] == 0.0 and moving
+            places = self.places(joint, positions, reach)
+            forked = any(below[child] for child in below[joint])
+            lone = len(below[joint]) == 1
+            if forked and ((lone and (idle or places)) or (idle and places)):
                 del self.parent[joint]
-                joint = below[joint][0]
-                self.parent[joint] = -1
+                self.parent.update(dict.fromkeys(below[joint], -1))
+                waiting.extend(below[joint])
+
+    def graft(self, positions: Array) -> None:
+        """Hang the smaller trees on the nearest joint of the largest, as feet that stand on IK."""
+        below = self.children()
+        trees = {root: [root] for root in self.roots()}
+        for joints in trees.values():
+            for joint in joints:
+                joints.extend(below[joint])
+        trunk = max(trees, key=lambda root: len(trees[root]))
+        stock = np.array(trees.pop(trunk))
+        for root in trees:
+            gap = np.linalg.norm(positions[stock] - positions[root], axis=1)
+            self.parent[root] = int(stock[np.argmin(gap)])
 
     def join(self, roots: list[int], above: int) -> None:
         """Hang the roots on a new root."""

@@ -146,7 +146,10 @@ def _faces(file: GltfFile, primitive: Entry, mode: int, count: int) -> NDArray[n
         at = np.arange(len(corners) - 2)
         faces = corners[np.column_stack([at, at + 1 + turn, at + 2 - turn])]
     a, b, c = faces.T
-    return faces[(a != b) & (b != c) & (c != a)]  # strips are stitched by triangles without area
+    whole: NDArray[np.int64] = faces[
+        (a != b) & (b != c) & (c != a)
+    ]  # strips are stitched by flat triangles
+    return whole
 
 
 def _colors(file: GltfFile, attributes: Entry, count: int) -> Array | None:

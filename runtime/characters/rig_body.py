@@ -67,9 +67,9 @@ def bone_radii(positions: Array, bones: Bones) -> Array:
         above = into.get(int(bones[number, 0]))
         if above is not None:
             carried[above] += carried[number]
-    branch = 0.1 * _SIZE * np.sqrt(carried / length.sum())
-    radii: Array = np.sqrt(branch * 0.3 * length)
-    return np.clip(radii, 0.008 * _SIZE, 0.08 * _SIZE)
+    branch = 0.07 * _SIZE * np.sqrt(carried / length.sum())
+    radii: Array = np.sqrt(branch * 0.26 * length)
+    return np.clip(radii, 0.006 * _SIZE, 0.055 * _SIZE)
 
 
 def _leaves_first(bones: Bones) -> list[int]:
