@@ -24,6 +24,7 @@ $(READY): pyproject.toml constraints.txt scripts/system-libraries
 	sh scripts/system-libraries
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check -c constraints.txt -e ".[dev]"
+	$(BIN)/bunraku doctor --warm
 	touch $(READY)
 
 clean:
