@@ -225,7 +225,7 @@ def _dressed(file: GltfFile, scene: Scene, joints: list[int]) -> GltfModel:
     if not joints:
         raise MeshError("it holds neither triangles nor a rig; export it with its mesh")
     rig = _rig(file, scene, [], joints)
-    if not np.ptp(rig.skeleton.rest_positions, axis=0).max() > 0.0:
+    if not np.ptp(rig.skeleton.rest_positions, axis=0).max() > 1e-9:
         raise MeshError("it holds no triangles, and all joints of its rig stand at one place")
     vertices, faces, weights = body_of(rig.skeleton)
     return GltfModel(

@@ -5,6 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
+from scipy.sparse.csgraph import shortest_path
+from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
 from devices.errors import InputError
 from devices.skeleton import Skeleton
@@ -18,8 +21,10 @@ Bones = NDArray[np.int64]
 
 _SIZE = 1.7
 """The rig is scaled to this extent [m] to be modelled: the signed distances are made for metres."""
-_PROFILE = (0.70, 0.95, 1.0, 0.92, 0.62)
+_PROFILE = (0.7, 1.0, 0.92, 0.62)
 """A turned limb: its radius from joint to joint."""
+_MOST_SAMPLES = 2_000_000
+"""The signed distance is asked for at about as many points."""
 _FEWEST, _WANTED, _MOST = 3_000, 5_000, 8_000
 
 
@@ -31,15 +36,17 @@ def body_of(skeleton: Skeleton) -> tuple[Array, Faces, csr_array]:
         each vertex follows the joint that its nearest bone turns about.
 
     Raises:
-        InputError: the optional package manifold3d is missing.
+        InputError: all joints stand at one place, or the optional package manifold3d is missing.
     """
     rest = skeleton.rest_positions
     lower, extent = rest.min(axis=0), float(np.linalg.norm(np.ptp(rest, axis=0)))
-    scale = _SIZE / extent
+    scale = _SIZE / max(extent, 1e-12)
     positions = (rest - lower) * scale
-    bones = np.array(
-        [(parent, joint) for joint, parent in enumerate(skeleton.parents) if parent >= 0]
-    )
+    joints = np.flatnonzero(skeleton.parents >= 0)
+    bones = np.column_stack([skeleton.parents[joints], joints])
+    bones = bones[np.linalg.norm(np.diff(positions[bones], axis=1), axis=(1, 2)) > 1e-6]
+    if not len(bones):
+        raise InputError("all joints of the rig stand at one place; no body fits round it")
     radii = bone_radii(positions, bones)
     try:
         vertices, faces = _meshed(positions, bones, radii)
@@ -55,10 +62,10 @@ def body_of(skeleton: Skeleton) -> tuple[Array, Faces, csr_array]:
 
 
 def bone_radii(positions: Array, bones: Bones) -> Array:
-    """The radius (b,) of each bone: of its length, and of how much hangs on it.
+    """The radius (b,) of each bone, from how much hangs on it.
 
-    Limbs thin out as branches do: the square root of the length of all that a bone carries bounds
-    what its own length asks for, so that long shins stay thin and short spines do not.
+    Limbs thin out as branches do: the section of each is in proportion to the length of all that
+    it carries (L. da Vinci's rule of trees). Limbs that lie side by side leave room between them.
     """
     length = np.linalg.norm(positions[bones[:, 1]] - positions[bones[:, 0]], axis=1)
     into = {int(joint): number for number, joint in enumerate(bones[:, 1])}
@@ -67,9 +74,34 @@ def bone_radii(positions: Array, bones: Bones) -> Array:
         above = into.get(int(bones[number, 0]))
         if above is not None:
             carried[above] += carried[number]
-    branch = 0.07 * _SIZE * np.sqrt(carried / length.sum())
-    radii: Array = np.sqrt(branch * 0.26 * length)
-    return np.clip(radii, 0.006 * _SIZE, 0.055 * _SIZE)
+    radii = 0.08 * _SIZE * np.sqrt(carried / length.sum())
+    # A head, the end of a bone on the middle plane, is an egg rather than a twig.
+    ends = ~np.isin(bones[:, 1], bones[:, 0])
+    middle = np.abs(positions[bones] - np.median(positions, axis=0))[..., 0].max(axis=1)
+    radii[ends & (middle < 0.02 * _SIZE)] *= 2.0
+    bounded: Array = np.minimum(radii, np.maximum(0.4 * _room(positions, bones), 0.6 * radii))
+    return np.clip(bounded, 0.006 * _SIZE, 0.06 * _SIZE)
+
+
+def _room(positions: Array, bones: Bones) -> Array:
+    """How far (b,) each bone is from those near it in space that are far along the skeleton."""
+    start, end = positions[bones[:, 0]], positions[bones[:, 1]]
+    count = len(positions)
+    length = np.maximum(np.linalg.norm(end - start, axis=1), 1e-9)
+    links = coo_array((length, (bones[:, 0], bones[:, 1])), shape=(count, count)).tocsr()
+    path = shortest_path(links, directed=False)  # (J, J)
+    along = np.linspace(0.0, 1.0, 7)
+    samples = start[:, None] + along[:, None] * (end - start)[:, None]  # (b, 7, 3)
+    room = np.full(len(bones), np.inf)
+    for number, (first, last) in enumerate(bones):
+        gap = (
+            cdist(samples[number], samples.reshape(-1, 3))
+            .reshape(len(along), -1, len(along))
+            .min(axis=(0, 2))
+        )
+        detour = np.minimum(path[first], path[last])[bones].min(axis=1)
+        room[number] = np.min(gap, where=detour > 2.5 * gap, initial=np.inf)
+    return room
 
 
 def _leaves_first(bones: Bones) -> list[int]:
@@ -83,37 +115,69 @@ def _leaves_first(bones: Bones) -> list[int]:
     return order[::-1]
 
 
-def _solid(positions: Array, bones: Bones, radii: Array) -> Field:
+def _solid(positions: Array, bones: Bones, radii: Array, air: float) -> Field:
+    """The body's signed distance; beyond `air` [m] from it, only a bound."""
     limbs = []
+    along = np.linspace(0.0, 1.0, len(_PROFILE))[:, None]
     for (start, end), radius in zip(bones, radii, strict=True):
-        along = np.linspace(0.0, 1.0, len(_PROFILE))[:, None]
         path = positions[start] + along * (positions[end] - positions[start])
         limbs.append(tube(path, radius * np.array(_PROFILE)))
-    return smooth_union(0.015 * _SIZE, *limbs)
+    body = smooth_union(0.008 * _SIZE, *limbs)
+    spacing = float(np.min(radii))
+    marks = cKDTree(np.concatenate([_marks(positions[a], positions[b], spacing) for a, b in bones]))
+    reach = float(radii.max()) + spacing + air
+
+    def field(points: Array) -> Array:
+        distance: Array = marks.query(points, distance_upper_bound=reach)[0]
+        near = np.isfinite(distance)
+        distance[~near] = air
+        distance[near] = body(points[near])
+        return distance
+
+    return field
+
+
+def _marks(start: Array, end: Array, spacing: float) -> Array:
+    """Points (k, 3) on a bone, no farther apart than `spacing`."""
+    count = int(np.linalg.norm(end - start) / spacing) + 2
+    marks: Array = start + np.linspace(0.0, 1.0, count)[:, None] * (end - start)
+    return marks
 
 
 def _meshed(positions: Array, bones: Bones, radii: Array) -> tuple[Array, Faces]:
     """The body's mesh, its edges chosen so that it has about as many vertices as are wanted."""
     length = np.linalg.norm(positions[bones[:, 1]] - positions[bones[:, 0]], axis=1)
     area = float(np.sum(2.0 * np.pi * radii * length))
-    edge = np.sqrt(area / (0.87 * _WANTED))
+    edge = 2.0 * np.sqrt(area / (0.87 * _WANTED))
+    # The first, coarse mesh only measures the area; the next ones are close.
+    vertices, faces, solid = _level_set(positions, bones, radii, edge)
+    finest = float(np.cbrt(2.0 * np.prod(np.ptp(positions, axis=0) + 0.2 * _SIZE) / _MOST_SAMPLES))
     for _ in range(3):
-        thick = np.maximum(radii, 0.8 * edge)
-        air = 2.0 * edge + thick.max()
-        sculpture = Sculpture(
-            solid=_solid(positions, bones, thick),
-            lower=tuple(positions.min(axis=0) - air),
-            upper=tuple(positions.max(axis=0) + air),
-            edge=edge,
-            base="",
-            paints=(),
-            limbs=(),
-        )
-        vertices, faces = level_set(sculpture)
+        edge = max(finest, edge * float(np.sqrt(len(vertices) / _WANTED)))
+        vertices, faces, solid = _level_set(positions, bones, radii, edge)
         if _FEWEST <= len(vertices) <= _MOST:
             break
-        edge *= float(np.sqrt(len(vertices) / _WANTED))
-    return relaxed(vertices, faces, sculpture.solid, edge, rounds=4), faces
+    return relaxed(vertices, faces, solid, edge, rounds=4), faces
+
+
+def _level_set(
+    positions: Array, bones: Bones, radii: Array, edge: float
+) -> tuple[Array, Faces, Field]:
+    thick = np.maximum(radii, 0.8 * edge)  # what is thinner than an edge would fall to pieces
+    air = 2.0 * edge
+    solid = _solid(positions, bones, thick, air)
+    lower, upper = positions.min(axis=0), positions.max(axis=0)
+    margin = float(thick.max()) + air
+    sculpture = Sculpture(
+        solid=solid,
+        lower=tuple((lower - margin).tolist()),
+        upper=tuple((upper + margin).tolist()),
+        edge=edge,
+        base="",
+        paints=(),
+        limbs=(),
+    )
+    return *level_set(sculpture), solid
 
 
 def _nearest_bone(points: Array, positions: Array, bones: Bones, radii: Array) -> Faces:
