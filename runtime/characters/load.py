@@ -2,21 +2,30 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from devices.errors import InputError
 from devices.skeleton import Skeleton
 from runtime.character import Character, Surface
 from runtime.characters.builtin import BUILTIN
 from runtime.characters.cache import cached_skeleton
-from runtime.characters.mesh_data import FileMesh
-from runtime.characters.mesh_file import MESH_SUFFIXES, read_mesh_file
+from runtime.characters.gltf_rig import read_gltf
+from runtime.characters.mesh_data import FileMesh, MeshError
+from runtime.characters.mesh_file import MESH_SUFFIXES, checked, read_mesh_file
 from runtime.characters.palette import palette_color
-from runtime.characters.placement import guess_rotation, placed, placement_matrix
-from runtime.characters.weld import first_occurrences, weld
+from runtime.characters.placement import (
+    ABOUT_FACE,
+    UPRIGHT,
+    guess_rotation,
+    placed,
+    placement_matrix,
+)
+from runtime.characters.weld import first_occurrences, weld, welded_weights
 
 RIG_SUFFIXES = (".glb", ".gltf", ".vrm")
 SUFFIXES = MESH_SUFFIXES + RIG_SUFFIXES
@@ -37,27 +46,65 @@ def load_character(path: Path) -> Character:
         raise InputError(
             f"{path}: there is no such file; built-in characters are {', '.join(BUILTIN)}"
         )
-    if path.suffix.lower() in RIG_SUFFIXES:
-        raise InputError(f"{path}: glTF is not read yet; convert it to OBJ")
-    return _from_mesh(path.stem, read_mesh_file(path), path)
+    return _from_rig(path) if path.suffix.lower() in RIG_SUFFIXES else _from_mesh(path)
 
 
-def _from_mesh(name: str, mesh: FileMesh, path: Path) -> Character:
+def _from_mesh(path: Path) -> Character:
+    mesh = read_mesh_file(path)
     vertex = weld(mesh.vertices)
-    welded = mesh.vertices[first_occurrences(vertex)]
-    faces = vertex[mesh.faces]
-    rotation, guesses = guess_rotation(welded, faces)
+    rotation, guesses = guess_rotation(mesh.vertices[first_occurrences(vertex)], vertex[mesh.faces])
+    return _standing(path, replace(mesh, notes=mesh.notes + guesses), vertex, rotation)
+
+
+def _from_rig(path: Path) -> Character:
+    """glTF says which way is up, VRM which way is forward: nothing to guess."""
+    model = read_gltf(path)
+    mesh = FileMesh(
+        model.file_vertices,
+        model.faces,
+        model.colors,
+        model.uvs,
+        model.materials,
+        model.face_material,
+        model.notes,
+    )
+    try:
+        mesh = checked(mesh)
+    except MeshError as error:
+        raise InputError(f"{path}: {error}") from None
+    rotation = ABOUT_FACE if model.faces_backward else UPRIGHT
+    rig = None
+    if model.skeleton is not None and model.weights is not None:
+        rig = model.skeleton, model.weights
+    return _standing(path, mesh, weld(mesh.vertices), rotation, rig)
+
+
+def _standing(
+    path: Path,
+    mesh: FileMesh,
+    vertex: NDArray[np.int64],
+    rotation: NDArray[np.float64],
+    rig: tuple[Skeleton, csr_array] | None = None,
+) -> Character:
+    """The character on the stage; the rig's joints and weights (M, K) are the file's."""
+    welded, faces = mesh.vertices[first_occurrences(vertex)], vertex[mesh.faces]
     placement = placement_matrix(rotation, welded[np.unique(faces)])
     vertices = placed(placement, welded)
+    weights = None
+    if rig is None:
+        skeleton = _extracted(vertices, faces, path)
+    else:
+        joints, weights = rig[0], welded_weights(rig[1], vertex)
+        skeleton = Skeleton(joints.names, joints.parents, placed(placement, joints.rest_positions))
     return Character(
-        name=name,
+        name=path.stem,
         vertices=vertices,
         faces=faces,
-        skeleton=_extracted(vertices, faces, path),
-        weights=None,
+        skeleton=skeleton,
+        weights=weights,
         surface=_surface(mesh, vertex),
         placement=placement,
-        notes=mesh.notes + guesses,
+        notes=mesh.notes,
     )
 
 
