@@ -1,0 +1,182 @@
+"""What the folders may know of each other, what a start may load, what a commit may hold."""
+
+from __future__ import annotations
+
+import ast
+import inspect
+import json
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from importlib import import_module
+from pathlib import Path
+from typing import get_type_hints
+
+import pytest
+
+from devices.stream import ADAPTERS, SkeletonStream
+from replay.player import Player
+
+CHECKOUT = Path(__file__).resolve().parents[1]
+ROOMS = ("devices", "replay", "solvers", "runtime")
+MAY_LOAD = {
+    "devices": {"devices"},
+    "replay": {"replay", "devices"},
+    "solvers": {"solvers"},
+    "runtime": set(ROOMS),
+}
+GRAPHICS = {"moderngl", "glfw"}
+EXTRAS = {
+    "av",
+    "fast_simplification",
+    "igl",
+    "imgui_bundle",
+    "manifold3d",
+    "meshio",
+    "pxr",
+    "pygel3d",
+}
+
+
+def loaded_by(code: str) -> set[str]:
+    """The top-level modules that a fresh interpreter has loaded after running `code`."""
+    tell = "import json, sys; print(json.dumps(sorted({n.split('.')[0] for n in sys.modules})))"
+    run = subprocess.run(
+        [sys.executable, "-c", f"{code}\n{tell}"],
+        cwd=CHECKOUT,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode == 0, run.stderr
+    return set(json.loads(run.stdout.splitlines()[-1]))
+
+
+def every_module_of(room: str) -> str:
+    """Code that imports all of a room."""
+    return (
+        f"import importlib, pkgutil, {room}\n"
+        f"for module in pkgutil.walk_packages({room}.__path__, '{room}.'):\n"
+        f"    importlib.import_module(module.name)"
+    )
+
+
+def sources(*rooms: str) -> Iterator[Path]:
+    for room in rooms:
+        yield from sorted((CHECKOUT / room).rglob("*.py"))
+
+
+def imported(path: Path, *, top_level: bool = False) -> set[str]:
+    """The top-level names that a file imports, anywhere or only when it is itself imported."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    inside: set[ast.AST] = set()
+    if top_level:
+        for node in ast.walk(tree):
+            if isinstance(node, ast.FunctionDef):
+                inside.update(ast.walk(node))
+    names: set[str] = set()
+    for node in ast.walk(tree):
+        if node in inside:
+            continue
+        if isinstance(node, ast.Import):
+            names.update(alias.name.split(".")[0] for alias in node.names)
+        elif isinstance(node, ast.ImportFrom) and node.module and node.level == 0:
+            names.add(node.module.split(".")[0])
+    return names
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_a_room_loads_no_room_that_it_may_not_know(room: str) -> None:
+    loaded = loaded_by(every_module_of(room))
+    assert loaded & set(ROOMS) == MAY_LOAD[room]
+    assert not loaded & EXTRAS
+    if room != "runtime":
+        assert not loaded & GRAPHICS
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_no_import_hidden_in_a_function_breaks_the_rule(room: str) -> None:
+    for path in sources(room):
+        assert imported(path) & set(ROOMS) <= MAY_LOAD[room], path
+
+
+def test_the_command_line_answers_without_loading_what_a_command_needs() -> None:
+    asked = (
+        "import contextlib, io, runtime.cli\n"
+        "with contextlib.redirect_stdout(io.StringIO()), contextlib.suppress(SystemExit):\n"
+        "    runtime.cli.main(['--help'])"
+    )
+    loaded = loaded_by(asked)
+    assert not loaded & (EXTRAS | GRAPHICS | {"numba", "numpy", "scipy", "solvers", "replay"})
+
+
+def test_extras_are_imported_where_they_are_used() -> None:
+    for path in sources(*ROOMS):
+        assert not imported(path, top_level=True) & EXTRAS, path
+
+
+def test_only_the_renderer_and_the_window_touch_graphics() -> None:
+    touching = {
+        path.relative_to(CHECKOUT).as_posix()
+        for path in sources(*ROOMS)
+        if imported(path) & GRAPHICS
+    }
+    # The theatre is handed a context and names its type; it calls nothing of moderngl.
+    outside = {path for path in touching if not path.startswith("runtime/render/")}
+    assert outside <= {"runtime/window.py", "runtime/theatre.py"}
+    theatre = (CHECKOUT / "runtime/theatre.py").read_text(encoding="utf-8")
+    assert set(re.findall(r"moderngl\.(\w+)", theatre)) <= {"Context"}
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_a_room_is_imported_from_this_checkout(room: str) -> None:
+    assert Path(str(import_module(room).__file__)).resolve() == CHECKOUT / room / "__init__.py"
+
+
+def methods_of_the_protocol() -> set[str]:
+    known = {name for name in vars(SkeletonStream) if not name.startswith("_")}
+    return known | {"__enter__", "__exit__"}
+
+
+@pytest.mark.parametrize("scheme", ADAPTERS)
+def test_an_adapter_is_the_protocol_and_nothing_more(scheme: str) -> None:
+    module = import_module(ADAPTERS[scheme])
+    hints = get_type_hints(module.open_device)
+    assert list(inspect.signature(module.open_device).parameters) == ["address"]
+    stream = hints["return"]
+    public = {name for name in vars(stream) if not name.startswith("_")}
+    assert public | {"__enter__", "__exit__"} == methods_of_the_protocol()
+    assert {"__enter__", "__exit__"} <= set(vars(stream))
+
+
+def test_a_player_can_stand_in_for_a_device() -> None:
+    assert methods_of_the_protocol() <= set(vars(Player))
+
+
+def tracked_text() -> Iterator[tuple[str, str]]:
+    if shutil.which("git") is None or not (CHECKOUT / ".git").exists():
+        pytest.skip("needs git and a checkout to know what is tracked")
+    listed = subprocess.run(
+        ["git", "ls-files", "-z"], cwd=CHECKOUT, capture_output=True, text=True, check=True
+    )
+    for name in listed.stdout.rstrip("\0").split("\0"):
+        path = CHECKOUT / name
+        if not path.is_file():
+            continue  # removed, not committed yet
+        data = path.read_bytes()
+        if b"\0" not in data:
+            yield name, data.decode("utf-8")
+
+
+# Put together from pieces, so that this file does not find itself.
+MACHINE_PATHS = re.compile(r"(?<![\w.])/(?:work|home|root|Users)" + r"/\w|[A-Z]:\\\\?Users", re.A)
+HOSTS = re.compile("|".join(("pypi" + r"\.org", "pythonhosted" + r"\.org", "index-" + "url")))
+
+
+def test_no_tracked_file_names_a_machine_or_a_registry() -> None:
+    for name, text in tracked_text():
+        for pattern in (MACHINE_PATHS, HOSTS):
+            found = pattern.search(text)
+            assert found is None, f"{name}: {found and found.group()}"
