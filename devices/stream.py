@@ -49,7 +49,10 @@ def open_stream(url: str) -> SkeletonStream:
         InputError: the scheme is unknown (the message lists the known ones), or the device cannot
             be opened.
     """
-    address = urlsplit(url)
+    try:
+        address = urlsplit(url)
+    except ValueError as error:
+        raise InputError(f"cannot open {url!r}: not an address ({error})") from error
     if address.scheme not in ADAPTERS:
         known = ", ".join(f"{scheme}://" for scheme in ADAPTERS)
         raise InputError(f"cannot open {url!r}: no such kind of device; there are: {known}")

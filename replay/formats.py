@@ -62,6 +62,8 @@ def recognise(path: Path) -> Format:
             head = file.read(HEAD_BYTES)
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror or error}") from error
+    if not head:
+        raise InputError(f"{path} is empty; record or copy it again")
     for candidate in formats():
         if candidate.recognises(path, head):
             return candidate

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import argparse
 import importlib
+import io
+import os
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from devices.errors import InputError
+from runtime.interrupt import Interrupted, interruptible
 
 Command = Callable[[argparse.Namespace], int]
 
 BAD_INPUT = 2
-INTERRUPTED = 130
 
 
 def size(text: str) -> tuple[int, int]:
@@ -188,19 +190,33 @@ def parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the exit code is 0, 2 for bad input, 130 after Ctrl-C."""
+    for stream in (sys.stdout, sys.stderr):  # a name may hold what the terminal cannot show
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
     try:
-        options = parser().parse_args(arguments)
-        run: Command = options.run
-        return run(options)
+        with interruptible():
+            options = parser().parse_args(arguments)
+            run: Command = options.run
+            code = run(options)
+            print(end="", flush=True)
+            return code
     except InputError as error:
-        line = " ".join(str(error).split())
-        print(f"bunraku: error: {line}", file=sys.stderr)
-        return BAD_INPUT
-    except KeyboardInterrupt:
-        return INTERRUPTED
-    except BrokenPipeError:
-        sys.stderr.close()
+        return _refuse(str(error))
+    except Interrupted as interrupted:
+        return interrupted.code
+    except BrokenPipeError:  # whoever read our output has seen enough
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except OSError as error:
+        where = f"{error.filename}: " if error.filename else ""
+        return _refuse(f"{where}{error.strerror or error}; check the file and its disk")
+    except MemoryError:
+        return _refuse("this needs more memory than there is; use a smaller file, or close others")
+
+
+def _refuse(reason: str) -> int:
+    print(f"bunraku: error: {' '.join(reason.split())}", file=sys.stderr)
+    return BAD_INPUT
 
 
 if __name__ == "__main__":

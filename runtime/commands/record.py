@@ -3,39 +3,44 @@
 from __future__ import annotations
 
 import argparse
+import math
 import sys
+import time
 
-from devices.stream import open_stream
+from devices.stream import SkeletonStream, open_stream
 from replay.mcap_writer import McapWriter
 from runtime.clock import Ticker
+from runtime.interrupt import held
+from runtime.output.whole_file import check_writable
 
 POLLS = 240.0  # a second: twice the fastest sensor
 
 
 def record(options: argparse.Namespace) -> int:
     """Write every frame that comes until Ctrl-C or `--seconds`."""
-    frames = 0
-    with (
-        open_stream(options.device) as stream,
-        McapWriter(options.out, stream.skeleton) as writer,
-    ):
-        ticker = Ticker(POLLS)
-        first: float | None = None
+    check_writable(options.out)
+    with open_stream(options.device) as stream:
+        writer = McapWriter(options.out, stream.skeleton)
         try:
-            while not stream.ended:
-                for frame in stream.poll():
-                    first = frame.time if first is None else first
-                    if options.seconds and frame.time - first >= options.seconds:
-                        return _told(frames, options)
-                    writer.write(frame)
-                    frames += 1
-                ticker.wait()
-        except KeyboardInterrupt:
-            _told(frames, options)
-            raise
-    return _told(frames, options)
-
-
-def _told(frames: int, options: argparse.Namespace) -> int:
-    print(f"bunraku: {frames} frames in {options.out}", file=sys.stderr)
+            _write_all(stream, writer, options.seconds or math.inf)
+        finally:
+            with held():
+                writer.close()
+            print(f"bunraku: {writer.frames} frames in {options.out}", file=sys.stderr)
     return 0
+
+
+def _write_all(stream: SkeletonStream, writer: McapWriter, seconds: float) -> None:
+    """Write what comes within `seconds` of the first frame; wait no longer than that for any."""
+    ticker = Ticker(POLLS)
+    began = time.monotonic()
+    first: float | None = None
+    over = False
+    while not (stream.ended or over):
+        over = time.monotonic() - began >= seconds
+        with held():
+            for frame in stream.poll():
+                first = frame.time if first is None else first
+                if frame.time - first < seconds:
+                    writer.write(frame)
+        ticker.wait()

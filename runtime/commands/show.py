@@ -5,9 +5,9 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
-from pathlib import Path
 
 from devices.stream import SkeletonStream, open_stream
 from replay.builtin import builtin_recording
@@ -18,16 +18,13 @@ from replay.recording import Recording
 from runtime.cast import character_named
 from runtime.characters.builtin import BUILTIN
 from runtime.clock import Ticker
+from runtime.commands.outputs import check_outputs, open_outputs
 from runtime.controls import Controls
 from runtime.director import Choices, Director
+from runtime.interrupt import held
 from runtime.loop import FrameLoop
 from runtime.mapping import Mapping, read_mapping
-from runtime.output.export import open_export
-from runtime.output.frames import Frames
-from runtime.output.output import Output
-from runtime.output.point_cache import PointCache
 from runtime.output.report import MatchedPair, Report
-from runtime.output.video import Video
 from runtime.performer import Performer
 from runtime.progress import Progress
 from runtime.puppet import Puppet
@@ -63,17 +60,17 @@ def demo(options: argparse.Namespace) -> int:
     options.character = options.character or list(BUILTIN)
     if not _has_display():
         options.headless = options.fast = True
-    return _show(options, _played(builtin_recording("show"), options))
+    return _show(options, lambda: _played(builtin_recording("show"), options))
 
 
 def replay(options: argparse.Namespace) -> int:
     """Let a recorded stream drive characters."""
-    return _show(options, _played(read_recording(options.recording), options))
+    return _show(options, lambda: _played(read_recording(options.recording), options))
 
 
 def live(options: argparse.Namespace) -> int:
     """Let a live stream drive characters."""
-    return _show(options, _Source(open_stream(options.device), TICKS, None, STEADY))
+    return _show(options, lambda: _Source(open_stream(options.device), TICKS, None, STEADY))
 
 
 def _has_display() -> bool:
@@ -89,10 +86,15 @@ def _played(recording: Recording, options: argparse.Namespace) -> _Source:
     return _Source(Player(recording, pace, loop=options.loop), rate, recording, 0.0)
 
 
-def _show(options: argparse.Namespace, source: _Source) -> int:
+def _show(options: argparse.Namespace, open_source: Callable[[], _Source]) -> int:
     """Open everything, run the loop to the end, close everything, whatever happens."""
-    with ExitStack() as closing:
-        _Show(options, source, closing).run()
+    check_outputs(options)
+    closing = ExitStack()
+    try:
+        _Show(options, open_source(), closing).run()
+    finally:
+        with held():  # nobody's impatience leaves half a file
+            closing.close()
     return 0
 
 
@@ -106,10 +108,9 @@ class _Show:
         self._stream = closing.enter_context(source.stream)
         self._performer = Performer(self._stream.skeleton, options.source)
         characters = [character_named(name) for name in options.character]
-        self._report = closing.enter_context(Report(options.report))
+        self._report = Report(options.report)
         self._parts = [self._report.cast(character) for character in characters]
         self._puppets = [Puppet(one, iterations=options.iterations) for one in characters]
-        self._outputs = self._open_outputs()
         self._window = None
         if not options.headless:
             self._window = closing.enter_context(Window("Bunraku", options.size))
@@ -118,31 +119,23 @@ class _Show:
 
     def run(self) -> None:
         """Perform until the stream ends or the window is closed."""
-        loop = FrameLoop(
-            self._stream,
-            self._performer,
-            self._puppets,
-            director=self._director,
-            report=self._report,
-            theatre=self._theatre,
-            outputs=self._outputs,
-            recorder=self._open_recorder(),
-            shown=self._window is not None,
-        )
-        self._closing.callback(self._tell, loop)
-        recording = self._source.recording
+        options, recording = self._options, self._source.recording
         if recording is not None:
-            filled = rehearse(recording, self._options.source, self._director)
+            filled = rehearse(recording, options.source, self._director)
             if self._theatre is not None:
                 self._theatre.frame_all(filled)
-        total = None if recording is None or self._options.loop else len(recording)
+        with held():
+            loop = self._open_loop()
+        total = None if recording is None or options.loop else len(recording)
         progress = self._closing.enter_context(Progress("performing", total))
         controls = None
         if self._window is not None and self._theatre is not None:
             controls = Controls(self._window, self._theatre, self._director, self._stream)
-        ticker = None if self._options.fast else Ticker(TICKS)
+        ticker = None if options.fast else Ticker(TICKS)
         while not self._stream.ended and not (controls is not None and controls.leaving):
-            if loop.tick():
+            with held():  # so that all outputs have the same frames
+                performed = loop.tick()
+            if performed:
                 progress.advance()
             if controls is not None:
                 controls.present()
@@ -150,41 +143,37 @@ class _Show:
             if ticker is not None:
                 ticker.wait()
 
+    def _open_loop(self) -> FrameLoop:
+        """The loop with all that keeps the show; opened last, when nothing else can fail."""
+        self._closing.enter_context(self._report)
+        cast = [
+            (puppet.character, part)
+            for puppet, part in zip(self._puppets, self._parts, strict=True)
+        ]
+        loop = FrameLoop(
+            self._stream,
+            self._performer,
+            self._puppets,
+            director=self._director,
+            report=self._report,
+            theatre=self._theatre,
+            outputs=open_outputs(self._options, cast, self._source.rate, self._closing),
+            recorder=self._open_recorder(),
+            shown=self._window is not None,
+        )
+        self._closing.callback(self._tell, loop)
+        return loop
+
     def _open_recorder(self) -> McapWriter | None:
         if self._options.record is None:
             return None
         return self._closing.enter_context(McapWriter(self._options.record, self._stream.skeleton))
 
-    def _open_outputs(self) -> list[list[Output]]:
-        """What keeps each puppet's performance; the pictures of all go with the first."""
-        options, rate = self._options, self._source.rate
-        outputs: list[list[Output]] = []
-        alone = len(self._puppets) == 1
-        for puppet, part in zip(self._puppets, self._parts, strict=True):
-            character = puppet.character
-            kept: list[Output] = [part]
-            if options.cache is not None:
-                path = options.cache if alone else _of(options.cache, character.name)
-                kept.append(self._closing.enter_context(PointCache(path, character)))
-            if options.export is not None:
-                path = options.export if alone else _of(options.export, character.name)
-                kept.append(self._closing.enter_context(open_export(path, character, rate=rate)))
-            outputs.append(kept)
-        if options.video is not None:
-            outputs[0].append(
-                self._closing.enter_context(
-                    Video(options.video, rate=rate, pictures_a_second=options.fps)
-                )
-            )
-        if options.frames is not None:
-            outputs[0].append(self._closing.enter_context(Frames(options.frames)))
-        return outputs
-
     def _open_theatre(self) -> Theatre | None:
         """The house, if anybody looks."""
         if self._window is not None:
             context, size = self._window.context, self._window.size
-        elif any(output.pictures_a_second > 0.0 for kept in self._outputs for output in kept):
+        elif self._options.video is not None or self._options.frames is not None:
             context, size = headless_context(), self._options.size
             self._closing.callback(release_headless, context)
         else:
@@ -231,8 +220,3 @@ class _Show:
                 for drive in puppet.mapping.drives
             ]
             part.matched(puppet.mapping.score, pairs)
-
-
-def _of(path: Path, name: str) -> Path:
-    """The file for one of several characters: OUT-squid.pc2 beside OUT.pc2."""
-    return path.with_name(f"{path.stem}-{name}{path.suffix}")

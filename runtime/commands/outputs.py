@@ -1,0 +1,120 @@
+"""Which files a show writes: all of them known, and known to be possible, before it begins."""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+from devices.errors import InputError
+from runtime.character import Character
+from runtime.output.export import open_export
+from runtime.output.frames import Frames
+from runtime.output.output import Output
+from runtime.output.point_cache import PointCache
+from runtime.output.report import Part
+from runtime.output.video import Video
+from runtime.output.whole_file import check_writable
+
+
+def check_outputs(options: argparse.Namespace) -> None:
+    """Make sure that every file of a show can be written, each once and over nothing it reads.
+
+    Raises:
+        InputError: a folder is missing, a file cannot be written, or two options name one file.
+    """
+    read = list(_read(options))
+    written = list(_written(options))
+    for option, path in written:
+        if option != "--frames":
+            check_writable(path)
+    for (option, path), (other, taken) in itertools.combinations(read + written, 2):
+        if (other, taken) in written and _same(path, taken):
+            raise InputError(
+                f"{other} cannot write {taken}: {option} is the same file; give each its own"
+            )
+
+
+def open_outputs(
+    options: argparse.Namespace,
+    cast: Sequence[tuple[Character, Part]],
+    rate: float,
+    closing: ExitStack,
+) -> list[list[Output]]:
+    """What keeps each character's performance; the pictures of all go with the first.
+
+    Args:
+        options: of the command line.
+        cast: the characters, each with its part of the report.
+        rate: about how many frames a second will come.
+        closing: closes what was opened.
+
+    Raises:
+        InputError: a suffix is not known, a library is missing, or a file cannot be written.
+    """
+    names = _names(options.character)
+    outputs: list[list[Output]] = []
+    for name, (character, part) in zip(names, cast, strict=True):
+        kept: list[Output] = [part]
+        if options.cache is not None:
+            cache = PointCache(_of(options.cache, name, names), character)
+            kept.append(closing.enter_context(cache))
+        if options.export is not None:
+            export = open_export(_of(options.export, name, names), character, rate=rate)
+            kept.append(closing.enter_context(export))
+        outputs.append(kept)
+    if options.video is not None:
+        video = Video(options.video, rate=rate, pictures_a_second=options.fps)
+        outputs[0].append(closing.enter_context(video))
+    if options.frames is not None:
+        outputs[0].append(closing.enter_context(Frames(options.frames)))
+    return outputs
+
+
+def _read(options: argparse.Namespace) -> Iterator[tuple[str, Path]]:
+    """Each file that the show reads, and what the command line calls it."""
+    if getattr(options, "recording", None) is not None:
+        yield "RECORDING", options.recording
+    for name in options.character:
+        yield "--character", Path(name)
+    if options.mapping is not None:
+        yield "--mapping", options.mapping
+
+
+def _written(options: argparse.Namespace) -> Iterator[tuple[str, Path]]:
+    """Each file and folder that the show writes, and the option that asks for it."""
+    names = _names(options.character)
+    for option in ("video", "frames", "cache", "report", "record", "export"):
+        path: Path | None = getattr(options, option)
+        if path is not None:
+            for name in names if option in ("cache", "export") else names[:1]:
+                own = _of(path, name, names) if option in ("cache", "export") else path
+                yield f"--{option}", own
+
+
+def _names(characters: Sequence[str]) -> list[str]:
+    """What tells the characters' files apart: their names, numbered where one comes again."""
+    names: list[str] = []
+    met: Counter[str] = Counter()
+    for character in characters:
+        stem = Path(character).stem
+        met[stem] += 1
+        names.append(stem if met[stem] == 1 else f"{stem}-{met[stem]}")
+    return names
+
+
+def _of(path: Path, name: str, names: Sequence[str]) -> Path:
+    """The file for one of several characters: OUT-squid.pc2 beside OUT.pc2."""
+    if len(names) == 1:
+        return path
+    return path.with_name(f"{path.stem}-{name}{path.suffix}")
+
+
+def _same(path: Path, other: Path) -> bool:
+    """Whether two paths lead to one file that is kept; a device such as /dev/null may be shared."""
+    if path.exists() and other.exists():
+        return path.samefile(other) and (path.is_file() or path.is_dir())
+    return path.resolve() == other.resolve()
