@@ -94,9 +94,13 @@ class Director:
         view = self._view()
         states = [rest_state(pose, heading=0.0) for pose in poses]
         for number, puppet in enumerate(self._puppets):
-            choices = [(self._choose(number, state.positions, 0.0), state) for state in states]
-            worths = [_worth(puppet, mapping, state, view) for mapping, state in choices]
-            mapping, rest = choices[int(np.argmax(worths))]
+            choices = []
+            for state in states:  # each by itself: no pose waits for the one before
+                shown = MatchHysteresis(self._choices.rank - 1)
+                mapping = self._choose(number, shown, state.positions, 0.0)
+                choices.append((mapping, state, shown))
+            worths = [_worth(puppet, mapping, state, view) for mapping, state, _ in choices]
+            mapping, rest, self._shown[number] = choices[int(np.argmax(worths))]
             puppet.take(mapping, rest, view, self._body(puppet, mapping, rest))
         self.matching = False
         return np.array([puppet.rehearse(poses) for puppet in self._puppets])
@@ -108,7 +112,7 @@ class Director:
             return
         changed = False
         for number, puppet in enumerate(self._puppets):
-            mapping = self._choose(number, pose.seen, frame.time)
+            mapping = self._choose(number, self._shown[number], pose.seen, frame.time)
             changed = changed or mapping.drives != puppet.mapping.drives
             puppet.show(mapping)
         if changed or np.isnan(self._since):
@@ -116,7 +120,9 @@ class Director:
         if frame.time - self._since >= self._choices.patience:
             self.accept()
 
-    def _choose(self, number: int, positions: Array, time: float) -> Mapping:
+    def _choose(
+        self, number: int, shown: MatchHysteresis, positions: Array, time: float
+    ) -> Mapping:
         """The mapping of one puppet for a pose (J, 3) [m]: by hand, or by the match shown."""
         by_hand = self._by_hand[number]
         if by_hand is not None:
@@ -128,7 +134,7 @@ class Director:
             limit=CANDIDATES + self._choices.rank,
             size_preference=SIZE_PREFERENCE,
         )
-        match = self._shown[number].update(ranked, time)
+        match = shown.update(ranked, time)
         if len(ranked) < self._choices.rank or match is None:
             raise InputError(
                 f"{self._puppets[number].character.name} has {len(ranked)} matches with this part "
@@ -164,21 +170,30 @@ class Director:
         self.matching = False
 
     def match_again(self) -> None:
-        """Return to matching."""
+        """Return to matching, by the pose alone, whatever was stepped to by hand."""
+        for shown in self._shown:
+            shown.release()
+        self._return_to_matching()
+
+    def next_match(self) -> None:
+        """Show the match after the one shown, and stay there; also in the midst of performing."""
+        self._step(1)
+
+    def previous_match(self) -> None:
+        """Show the match before the one shown, and stay there; also in the midst of performing."""
+        self._step(-1)
+
+    def _step(self, ranks: int) -> None:
+        for shown in self._shown:
+            shown.cycle(ranks)
+        if not self.matching:
+            self._return_to_matching()
+
+    def _return_to_matching(self) -> None:
         self.matching = True
         self._since = float("nan")
         for puppet in self._puppets:
             puppet.rest()
-
-    def next_match(self) -> None:
-        """Show the match after the one shown, and stay there."""
-        for shown in self._shown:
-            shown.cycle(1)
-
-    def previous_match(self) -> None:
-        """Show the match before the one shown, and stay there."""
-        for shown in self._shown:
-            shown.cycle(-1)
 
 
 def _worth(puppet: Puppet, mapping: Mapping, rest: Rest, view: Array) -> float:
