@@ -16,7 +16,7 @@ class Lead:
 
     def leads(self, frame: SkeletonFrame) -> bool:
         """Whether this frame is the lead's."""
-        gone = frame.time - self._seen > PATIENCE or frame.time < self._seen
+        gone = abs(frame.time - self._seen) > PATIENCE  # a clock may have been set back
         if self._performer is None or (frame.performer != self._performer and gone):
             self._performer = frame.performer
         if frame.performer != self._performer:
