@@ -110,7 +110,7 @@ class FrameLoop:
             for frame in frames:
                 self._recorder.write(frame)
         leading = [frame for frame in frames if self._lead.leads(frame)]
-        self._report.dropped += max(len(leading) - 1, 0)
+        self._report.dropped += max(len(frames) - 1, 0)
         if leading:
             return leading[-1], True
         return (frames[-1] if frames else None), False
@@ -135,7 +135,8 @@ class FrameLoop:
         self.frames += 1
 
     def _publish(self, time: float) -> None:
-        wanted = time - self._pictured >= self._picture_step
+        step = self._picture_step
+        wanted = math.isfinite(step) and time - self._pictured >= step
         picture = None
         with self._timer.stage("render"):
             if self._theatre is not None and (self._shown or wanted):
