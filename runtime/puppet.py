@@ -283,9 +283,8 @@ class Puppet:
         return targets
 
     def _with_body(self, vertices: Array) -> Motion:
-        lift = self._lift
-        if self._lift < 0.0:  # a lowered body must not sink into the floor
-            lift = max(self._lift, -float(vertices[:, 1].min()))
+        # A lowered body must not sink into the floor.
+        lift = max(self._lift, min(-float(vertices[:, 1].min()), 0.0))
         self._shift = np.array([0.0, lift, 0.0])
         whole = Rotation.from_rotvec([0.0, self._turn, 0.0])
         return Motion(
@@ -328,11 +327,13 @@ def body_of(mapping: Mapping, legs: list[frozenset[int]], source: Array, target:
         target: (K, 3) [m] the character's nodes at rest.
     """
     driving = [
-        drive for drive in mapping.drives for leg in legs if len(leg.intersection(drive.source)) > 1
+        [drive for drive in mapping.drives if len(leg.intersection(drive.source)) > 1]
+        for leg in legs
     ]
-    if len(driving) < 2 or len(driving) < len(legs):
+    if len(legs) < 2 or not all(driving):
         return Body()
-    return Body(turns=True, lift=_length(driving, target, source))
+    legs_drive = [drive for drives in driving for drive in drives]
+    return Body(turns=True, lift=_length(legs_drive, target, source))
 
 
 def _length(drives: list[Drive], target: Array, source: Array) -> float:
