@@ -55,10 +55,11 @@ def read_mapping(path: Path, source: Skeleton, target: Skeleton) -> Mapping:
         InputError: the file is not there, is not such JSON, or names what is not there.
     """
     try:
-        text = path.read_bytes()[: MAX_FILE + 1]
+        with path.open("rb") as file:
+            text = file.read(MAX_FILE + 1)
         if len(text) > MAX_FILE:
             raise InputError(f"{path} is too large for a mapping (over {MAX_FILE} bytes)")
-        pairs = json.loads(text)["pairs"]
+        pairs = _listed(json.loads(text), "pairs")
         drives = tuple(_drive(pair, source, target) for pair in pairs)
     except OSError as error:
         raise InputError(f"cannot read the mapping {path}: {error.strerror or error}") from error
@@ -75,10 +76,13 @@ def read_mapping(path: Path, source: Skeleton, target: Skeleton) -> Mapping:
 
 
 def _drive(pair: dict[str, Any], source: Skeleton, target: Skeleton) -> Drive:
+    flip = pair.get("flip", False)
+    if not isinstance(flip, bool):
+        raise TypeError(f"`flip` is true or false, got {flip!r}")
     drive = Drive(
-        source=tuple(source.index(str(name)) for name in pair["source"]),
-        target=tuple(_node(node, target) for node in pair["target"]),
-        flip=bool(pair.get("flip", False)),
+        source=tuple(source.index(str(name)) for name in _listed(pair, "source")),
+        target=tuple(_node(node, target) for node in _listed(pair, "target")),
+        flip=flip,
     )
     for end, chain in (("source", drive.source), ("target", drive.target)):
         if len(chain) < 2 or len(set(chain)) != len(chain):
@@ -89,6 +93,13 @@ def _drive(pair: dict[str, Any], source: Skeleton, target: Skeleton) -> Drive:
                 f"target nodes {target.names[near]} and {target.names[far]} share no bone"
             )
     return drive
+
+
+def _listed(holder: dict[str, Any], key: str) -> list[Any]:
+    found = holder[key]
+    if not isinstance(found, list):
+        raise TypeError(f"`{key}` is a list, got {type(found).__name__}")
+    return found
 
 
 def _node(node: object, target: Skeleton) -> int:
