@@ -218,10 +218,16 @@ def _owners(
         limb_of_node[limb[1:]] = number
     limb_of_anchor = np.array([limb_of_node[anchor.node] for anchor in anchors])
     branching = np.array([anchor.node == anchor.pivot for anchor in anchors])
-    gap = np.linalg.norm(vertices[:, None, :] - points[None, :, :], axis=2)  # (N, A)
-    own = (limb_of_node[nearest][:, None] == limb_of_anchor[None, :]) | branching[None, :]
-    gap = np.where(own, gap, np.inf)
-    owner: Indices = np.argmin(gap, axis=1).astype(np.int64)
+    limb_of_vertex = limb_of_node[nearest]
+    owner = np.zeros(len(vertices), dtype=np.int64)
+    least = np.full(len(vertices), np.inf)
+    for index, point in enumerate(points):  # a matrix of all gaps would not fit a large character
+        offset = vertices - point
+        gap = np.einsum("ij,ij->i", offset, offset)
+        near = gap < least
+        if not branching[index]:
+            near &= limb_of_vertex == limb_of_anchor[index]
+        owner[near], least[near] = index, gap[near]
     return owner
 
 

@@ -79,7 +79,9 @@ def bones_in_trunk(
     inside = np.zeros(len(parents), dtype=bool)
     for limb in limbs(parents):
         lengths = np.linalg.norm(np.diff(positions[limb], axis=0), axis=1)
-        along = np.cumsum(lengths) / max(float(lengths.sum()), 1e-30)
+        if not lengths.any():  # nodes on one spot lead nowhere
+            continue
+        along = np.cumsum(lengths) / lengths.sum()
         outer = np.isin(nearest, [n for n, at in zip(limb[1:], along, strict=True) if at > 0.5])
         radius = float(np.median(distance[outer])) if outer.any() else np.inf
         for pivot, node, end in zip(limb, limb[1:], along, strict=False):
