@@ -14,7 +14,7 @@ from scipy.sparse import coo_array, csr_array
 from runtime.characters.gltf_file import COMPRESSIONS, GltfFile, compressed
 from runtime.characters.gltf_json import Entry
 from runtime.characters.gltf_material import MaterialReader, texture_coordinates
-from runtime.characters.gltf_scene import Scene
+from runtime.characters.gltf_scene import MOST_NODES, Scene
 from runtime.characters.mesh_data import MOST_FACES, MOST_VERTICES, MeshError
 
 Array = NDArray[np.float64]
@@ -129,6 +129,8 @@ def _check_count(file: GltfFile, index: int, most: int, what: str) -> None:
 
 def _faces(file: GltfFile, primitive: Entry, mode: int, count: int) -> NDArray[np.int64]:
     index = primitive.optional("indices")
+    if index is not None:
+        _check_count(file, index, 3 * MOST_FACES, "indices")
     corners = np.arange(count) if index is None else file.wholes(index, "SCALAR")[:, 0]
     if len(corners) and corners.max() >= count:
         raise primitive.wrong(f"a triangle names vertex {corners.max()} of {count}")
@@ -152,13 +154,18 @@ def _faces(file: GltfFile, primitive: Entry, mode: int, count: int) -> NDArray[n
     return whole
 
 
+def _matching(file: GltfFile, attributes: Entry, name: str, count: int) -> int:
+    """The index of an attribute's accessor, which must have as many elements as the positions."""
+    index = attributes.whole(name)
+    if file.count(index) != count:
+        raise attributes.wrong(f"{name} has {file.count(index)} elements for {count} vertices")
+    return index
+
+
 def _colors(file: GltfFile, attributes: Entry, count: int) -> Array | None:
-    index = attributes.optional("COLOR_0")
-    if index is None:
+    if "COLOR_0" not in attributes:
         return None
-    values = file.floats(index, "VEC3", "VEC4")
-    if len(values) != count:
-        raise attributes.wrong(f"COLOR_0 has {len(values)} of {count} elements")
+    values = file.floats(_matching(file, attributes, "COLOR_0", count), "VEC3", "VEC4")
     colors = np.ones((count, 4))
     colors[:, : values.shape[1]] = np.clip(np.nan_to_num(values, nan=1.0), 0.0, 1.0)
     return colors
@@ -166,12 +173,9 @@ def _colors(file: GltfFile, attributes: Entry, count: int) -> Array | None:
 
 def _uvs(file: GltfFile, attributes: Entry, material: int | None, count: int) -> Array | None:
     name, place = texture_coordinates(file, material)
-    index = attributes.optional(name)
-    if index is None:
+    if name not in attributes:
         return None
-    values = file.floats(index, "VEC2")
-    if len(values) != count:
-        raise attributes.wrong(f"{name} has {len(values)} of {count} elements")
+    values = file.floats(_matching(file, attributes, name, count), "VEC2")
     values = np.clip(np.nan_to_num(values, posinf=0.0, neginf=0.0), -1e6, 1e6)
     return values @ place[:, :2].T + place[:, 2]
 
@@ -189,13 +193,11 @@ def _weights(
         raise skin.wrong("it has no joints")
     total = csr_array((count, known))
     for number in range(8):
-        joints = attributes.optional(f"JOINTS_{number}")
-        weights = attributes.optional(f"WEIGHTS_{number}")
-        if joints is None or weights is None:
+        joints, weights = f"JOINTS_{number}", f"WEIGHTS_{number}"
+        if joints not in attributes or weights not in attributes:
             break
-        who, how_much = file.wholes(joints, "VEC4"), file.floats(weights, "VEC4")
-        if len(who) != count or len(how_much) != count:
-            raise attributes.wrong(f"its skin weights are not {count} as its vertices are")
+        who = file.wholes(_matching(file, attributes, joints, count), "VEC4")
+        how_much = file.floats(_matching(file, attributes, weights, count), "VEC4")
         if not (np.abs(how_much) < 1e6).all():
             raise attributes.wrong("a skin weight is not a finite number")
         how_much = np.maximum(how_much, 0.0)
@@ -229,10 +231,10 @@ def _skinned(
     to_joint = np.tile(np.eye(4), (len(joints), 1, 1))
     index = skin.optional("inverseBindMatrices")
     if index is not None:
-        stored = file.floats(index, "MAT4")
-        if len(stored) < len(joints):
-            raise skin.wrong(f"it has {len(stored)} inverse bind matrices for {len(joints)} joints")
-        to_joint = stored[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
+        count = file.count(index)
+        if not len(joints) <= count <= MOST_NODES:
+            raise skin.wrong(f"it has {count} inverse bind matrices for {len(joints)} joints")
+        to_joint = file.floats(index, "MAT4")[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
     if not (np.abs(to_joint) < 1e15).all():
         raise skin.wrong("an inverse bind matrix is not finite")
     posing = (scene.to_scene[joints] @ to_joint)[:, :3]  # (k, 3, 4)
