@@ -6,6 +6,7 @@ from pathlib import Path
 
 from runtime.character import Character
 from runtime.characters.builtin import BUILTIN, builtin_character
+from runtime.characters.bundles import unbundled
 from runtime.characters.load import SUFFIXES, load_character
 from runtime.characters.presentation import presented
 
@@ -23,4 +24,4 @@ def character_named(name: str) -> Character:
     """
     if name in BUILTIN:
         return builtin_character(name)
-    return presented(load_character(Path(name)))
+    return presented(unbundled(load_character(Path(name))))

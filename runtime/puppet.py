@@ -283,8 +283,8 @@ class Puppet:
         return targets
 
     def _with_body(self, vertices: Array) -> Motion:
-        # A lowered body must not sink into the floor.
-        lift = max(self._lift, min(-float(vertices[:, 1].min()), 0.0))
+        # Nothing may sink into the floor: what pushes against it lifts the whole.
+        lift = max(self._lift, -float(vertices[:, 1].min()))
         self._shift = np.array([0.0, lift, 0.0])
         whole = Rotation.from_rotvec([0.0, self._turn, 0.0])
         return Motion(

@@ -212,21 +212,24 @@ def _owners(
     anchors: list[_Anchor],
     points: Array,
 ) -> Indices:
-    """The anchor nearest to each vertex among those of its own limb, of all where it has none."""
+    """The anchor nearest to each vertex among those of its limb and of the forks at its ends."""
     limb_of_node = np.full(len(parents), -1, dtype=np.int64)
+    ends = np.full((len(parents) + 1, 2), int(np.flatnonzero(parents < 0)[0]))  # last: no limb
     for number, limb in enumerate(limbs(parents)):
         limb_of_node[limb[1:]] = number
-    limb_of_anchor = np.array([limb_of_node[anchor.node] for anchor in anchors])
-    branching = np.array([anchor.node == anchor.pivot for anchor in anchors])
+        ends[number] = limb[0], limb[-1]
     limb_of_vertex = limb_of_node[nearest]
     owner = np.zeros(len(vertices), dtype=np.int64)
     least = np.full(len(vertices), np.inf)
-    for index, point in enumerate(points):  # a matrix of all gaps would not fit a large character
+    # One anchor after the other: a matrix of all gaps would not fit a large character.
+    for index, (anchor, point) in enumerate(zip(anchors, points, strict=True)):
         offset = vertices - point
         gap = np.einsum("ij,ij->i", offset, offset)
-        near = gap < least
-        if not branching[index]:
-            near &= limb_of_vertex == limb_of_anchor[index]
+        if anchor.node == anchor.pivot:
+            own = (ends[limb_of_vertex] == anchor.node).any(axis=1)
+        else:
+            own = limb_of_vertex == limb_of_node[anchor.node]
+        near = own & (gap < least)
         owner[near], least[near] = index, gap[near]
     return owner
 

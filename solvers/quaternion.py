@@ -77,12 +77,3 @@ def power(q: Quaternion, t: float) -> Quaternion:
     half = t * math.atan2(sine, q[3])
     scale = math.sin(half) / sine
     return (q[0] * scale, q[1] * scale, q[2] * scale, math.cos(half))
-
-
-@kernel
-def halfway(a: Quaternion, b: Quaternion) -> Quaternion:
-    """The rotation in the middle between `a` and `b`, the short way."""
-    sign = 1.0 if a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] >= 0.0 else -1.0
-    return normalized(
-        (a[0] + sign * b[0], a[1] + sign * b[1], a[2] + sign * b[2], a[3] + sign * b[3])
-    )

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.compiled import kernel
-from solvers.quaternion import halfway, normalized, rotate
+from solvers.quaternion import normalized, rotate
 from solvers.tree import Tree
 
 Array = NDArray[np.float64]
@@ -59,9 +59,9 @@ class SkeletonPose:
         """Rotations (K, 4) and positions (K, 3) of all nodes.
 
         A point x of the surface that follows node k goes to R_k (x - rest_k) + position_k. Inside a
-        chain a node takes the rotation halfway between its two bones, at the chain's end that of
-        its last bone; where a chain starts the node keeps what moves it otherwise, so that the
-        joint region bends from the one to the other. All other nodes ride with their parent.
+        chain a node turns with the bone that starts at it, as a rig's joint does, and what hangs
+        there rides along; at the chain's end with its last bone; where a chain starts the node
+        keeps what moves it otherwise. All other nodes ride with their parent.
 
         Args:
             bone_rotations: for each chain, world rotations from rest (len(chain) - 1, 4).
@@ -122,5 +122,5 @@ def _forward(  # noqa: PLR0917
             positions[node, k] = positions[parent, k] + offset[k]
         if following[node] >= 0:
             own = bones[following[node]]
-            bone = halfway(bone, normalized((own[0], own[1], own[2], own[3])))
+            bone = normalized((own[0], own[1], own[2], own[3]))
         rotations[node, 0], rotations[node, 1], rotations[node, 2], rotations[node, 3] = bone
