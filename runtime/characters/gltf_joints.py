@@ -61,10 +61,10 @@ def build_rig(
     positions = scene.positions
     reach = float(np.linalg.norm(np.ptp(positions[sorted(joints)], axis=0)))
     tree = _Tree.of(scene, joints, weight, names)
-    tree.merge_coincident(positions, _COINCIDENT * reach)
     if moving:
         tree.drop_idle(positions)
     tree.drop_stem(positions, _STEM * reach, moving=moving)
+    tree.merge_coincident(positions, _COINCIDENT * reach)
     roots = tree.roots()
     if len(roots) > 1:
         above = _above_all(scene, roots)

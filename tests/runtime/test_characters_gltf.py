@@ -607,7 +607,7 @@ def test_any_document_reads_or_is_refused(tmp_path: Path, data: st.DataObject) -
         for step in way:
             spot = spot[step]
         if data.draw(st.booleans()):
-            spot[last] = data.draw(ODD)
+            spot[last] = copy.deepcopy(data.draw(ODD))  # it may be changed in its turn
         else:
             del spot[last]
     path = tmp_path / "mutated.glb"
