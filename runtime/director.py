@@ -24,6 +24,7 @@ from solvers.posture import likeness
 
 LEAST_SEEN = 0.5  # share of the driving joints that must be in view to strike a pose
 CANDIDATES = 20  # matches that can be cycled through
+EVERY = 2  # of the poses of a rehearsal are gone through; the rest state is chosen from all
 
 Array = NDArray[np.float64]
 View = Callable[[], Array]
@@ -103,7 +104,7 @@ class Director:
             mapping, rest, self._shown[number] = choices[int(np.argmax(worths))]
             puppet.take(mapping, rest, view, self._body(puppet, mapping, rest))
         self.matching = False
-        return np.array([puppet.rehearse(poses) for puppet in self._puppets])
+        return np.array([puppet.rehearse(poses[::EVERY]) for puppet in self._puppets])
 
     def direct(self, frame: SkeletonFrame) -> None:
         """While matching, show the best match of the newest pose; accept it in time."""

@@ -178,14 +178,13 @@ class Puppet:
         Returns:
             (2, 3) [m] least and greatest corner of all that it fills meanwhile, on the stage.
         """
-        drive_of_edge = self._drives_of_edges()
+        owners = self._drives_of_edges()
         for _ in range(ROUNDS):
             boxes, stretches = zip(*(self._try(pose) for pose in poses), strict=True)
-            stretch = np.concatenate(stretches)
-            drives = np.tile(drive_of_edge, len(poses))
+            stretch = np.array(stretches)
             if np.percentile(stretch, 99.0) <= MOST_STRETCH:
                 break
-            self._hold_back(stretch, drives)
+            self._hold_back(stretch, owners)
         self._solver.reset()
         for _, retarget in self._retargets:
             retarget.reset()
@@ -201,26 +200,23 @@ class Puppet:
         box = np.array([seen.min(axis=0), seen.max(axis=0)])
         return box, np.abs(lengths / self._rest_lengths - 1.0)
 
-    def _hold_back(self, stretch: Array, drives: Indices) -> None:
-        tight = [
-            float(np.percentile(stretch[drives == number], 99.0, method="lower"))
-            if (drives == number).any()
-            else 0.0
-            for number in range(len(self.gains))
-        ]
-        if max(tight) <= MOST_STRETCH:  # the fault lies where no limb is, so with all of them
-            self.gains *= LEAST_STEP
-            return
+    def _hold_back(self, stretch: Array, owners: Indices) -> None:
+        """Make the turns smaller of each drive whose edges, of all E in T poses, are too tight."""
+        tight = np.zeros(len(self.gains))
+        for number in range(len(self.gains)):
+            own = stretch[:, (owners == number).any(axis=1)]
+            tight[number] = np.percentile(own, 99.0) if own.size else 0.0
+        if tight.max(initial=0.0) <= MOST_STRETCH:  # the fault lies where no limb is: with all
+            tight[:] = MOST_STRETCH / LEAST_STEP
         shares = np.clip(MOST_STRETCH / np.maximum(tight, MOST_STRETCH), 0.75, 1.0)
         self.gains *= np.where(shares < 1.0, np.minimum(shares, LEAST_STEP), 1.0)
 
     def _drives_of_edges(self) -> Indices:
-        """Which drive moves each edge (E,), -1 for none."""
+        """Which drives move the two ends of each edge (E, 2), -1 for none."""
         drive_of_node = np.full(len(self.tree), -1, dtype=np.int64)
         for number, chain in enumerate(self._chains):
             drive_of_node[list(chain[1:])] = number
-        drive_of_vertex = drive_of_node[self._binding.node][self._binding.owner]
-        found: Indices = drive_of_vertex[self._edges].max(axis=1)
+        found: Indices = drive_of_node[self._binding.node][self._binding.owner][self._edges]
         return found
 
     def limb(self, chain: tuple[int, ...]) -> tuple[int, ...]:
