@@ -71,6 +71,9 @@ def _add_show_options(parser: argparse.ArgumentParser) -> None:
     show.add_argument("--speed", type=positive, default=1.0, metavar="X", help="times the recorded")
     show.add_argument("--loop", action="store_true", help="start again after the last frame")
     show.add_argument("--transparent", action="store_true", help="no stage behind the character")
+    show.add_argument(
+        "--plain", action="store_true", help="without the matched chains and the mirror"
+    )
     match = parser.add_argument_group("who drives what")
     match.add_argument(
         "--source",
@@ -154,7 +157,7 @@ def parser() -> argparse.ArgumentParser:
     )
     _characters(demo, required=False)
     _add_show_options(demo)
-    demo.set_defaults(fps=30.0)
+    demo.set_defaults(fps=30.0, size=(1280, 560))
 
     replay = add("replay", _command("show", "replay"), "a recorded stream drives a character")
     replay.add_argument("recording", type=Path, metavar="RECORDING")

@@ -31,6 +31,7 @@ class Theatre:
         puppets: who is on stage, from left to right.
         performer: the skeleton shown in the mirror.
         transparent: no house and no floor.
+        plain: neither the matched chains nor the mirror.
     """
 
     def __init__(
@@ -41,6 +42,7 @@ class Theatre:
         performer: Skeleton,
         *,
         transparent: bool = False,
+        plain: bool = False,
     ) -> None:
         self.stage = Stage(context, size, transparent=transparent)
         self._puppets = puppets
@@ -54,8 +56,8 @@ class Theatre:
             )
             for puppet, place in zip(puppets, places, strict=True)
         ]
-        self._inset = None if transparent else SkeletonInset(performer.parents)
-        self.highlights = not transparent
+        self._inset = None if plain else SkeletonInset(performer.parents)
+        self.highlights = not plain
         self.camera = front_camera()
         self.frame_all()
 
