@@ -23,6 +23,8 @@ from solvers.tree import Tree
 
 Array = NDArray[np.float64]
 
+HIGHEST_SOLE = 0.15  # [m] an ankle; a skeleton whose lowest joint is higher does not stand at rest
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:
@@ -33,12 +35,14 @@ class Pose:
         filled: (J,) bool, joints that were not seen but filled in.
         heading: [rad] about +Y, how far the whole body has turned from facing +Z.
         hips: (3,) [m] where the hips are; the body turns about them.
+        sole: [m] how far the lowest joint is above the floor as one stands.
     """
 
     seen: Array
     filled: NDArray[np.bool_]
     heading: float
     hips: Array
+    sole: float
 
     def facing(self, heading: float) -> Array:
         """Every joint (J, 3) [m], the whole body turned so that it has this heading [rad]."""
@@ -52,7 +56,7 @@ class Rest:
     Attributes:
         positions: (J, 3) [m] every joint.
         heading: [rad] the heading of that pose.
-        height: [m] of the hips above the lowest joint, as one stands.
+        height: [m] of the hips above the floor, as one stands.
     """
 
     positions: Array
@@ -63,7 +67,7 @@ class Rest:
 def rest_state(pose: Pose, heading: float | None = None) -> Rest:
     """Make a pose the rest state, seen under `heading` [rad], under its own if that is None."""
     under = pose.heading if heading is None else heading
-    height = float(pose.hips[1] - pose.seen[:, 1].min())
+    height = float(pose.hips[1] - pose.seen[:, 1].min()) + pose.sole
     return Rest(pose.facing(under), under, height)
 
 
@@ -93,6 +97,7 @@ class Performer:
         self._hips = hips_joint(skeleton)
         self._parts = label_joints(skeleton)
         self._filler = Filler(skeleton)
+        self._sole = float(np.clip(skeleton.rest_positions[:, 1].min(), 0.0, HIGHEST_SOLE))
         self._heading = 0.0
         self.pose: Pose | None = None
 
@@ -101,7 +106,7 @@ class Performer:
         filled = self._filler.fill(frame)
         positions = filled.positions
         self._heading = heading(positions, self._pairs, self._heading)
-        self.pose = Pose(positions, filled.filled, self._heading, positions[self._hips])
+        self.pose = Pose(positions, filled.filled, self._heading, positions[self._hips], self._sole)
         return self.pose
 
     def limb(self, chain: tuple[int, ...]) -> tuple[int, ...]:

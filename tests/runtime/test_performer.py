@@ -34,12 +34,12 @@ def test_who_turns_round_and_round_keeps_turning() -> None:
     np.testing.assert_allclose(measured, headings, atol=1e-9)
 
 
-def test_a_rest_state_keeps_the_height_of_the_hips_above_the_feet() -> None:
+def test_a_rest_state_keeps_the_height_of_the_hips_as_one_stands() -> None:
     performer = Performer(BODY)
     stands = performer.follow(frame(pose()))
     jumps = performer.follow(frame(pose(T_POSE, heading=0.8, moved=(0.0, 0.4, 0.0)), 0.1))
-    lowest = BODY.rest_positions[:, 1].min()
-    expected = BODY.rest_positions[HIPS, 1] - lowest
+    assert BODY.rest_positions[:, 1].min() > 0.02, "no joint is as low as the sole"
+    expected = BODY.rest_positions[HIPS, 1]
     assert rest_state(stands).height == pytest.approx(expected)
     assert rest_state(jumps).height == pytest.approx(expected), "in the air as on the floor"
     own, front = rest_state(jumps), rest_state(jumps, heading=0.0)
@@ -47,6 +47,16 @@ def test_a_rest_state_keeps_the_height_of_the_hips_above_the_feet() -> None:
     np.testing.assert_allclose(own.positions, jumps.seen, atol=1e-12)
     assert front.heading == 0.0
     np.testing.assert_allclose(front.positions, pose(T_POSE, moved=(0.0, 0.4, 0.0)), atol=1e-12)
+
+
+@pytest.mark.parametrize(("lowest", "sole"), [(0.08, 0.08), (-0.3, 0.0), (1.1, 0.15)])
+def test_a_skeleton_that_does_not_stand_at_rest_tells_little_of_its_soles(
+    lowest: float, sole: float
+) -> None:
+    places = BODY.rest_positions.copy()
+    places[:, 1] += lowest - places[:, 1].min()
+    performer = Performer(Skeleton(BODY.names, BODY.parents, places))
+    assert performer.follow(frame(pose())).sole == pytest.approx(sole)
 
 
 def test_joints_that_are_not_seen_are_filled() -> None:
