@@ -18,6 +18,7 @@ from solvers.heading import turned
 BODY = puppet_skeleton()
 HIPS = BODY.index("SpineBase")
 BRICK = 0.08  # [m]
+FRONT_VIEW = np.eye(3)
 
 NODES = {
     "pelvis": ("", (0.0, 0.88, 0.0)),

@@ -1,0 +1,260 @@
+"""The loop, frame by frame: what is performed, kept, dropped and drawn."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Self
+
+import moderngl
+import numpy as np
+import pytest
+
+from devices.errors import InputError
+from devices.skeleton import SkeletonFrame
+from replay.player import EveryFrame, Player, RealTime
+from replay.recording import Recording
+from runtime.director import Choices, Director
+from runtime.loop import FrameLoop
+from runtime.mapping import Mapping
+from runtime.output.output import PerformedFrame
+from runtime.output.report import Report
+from runtime.performer import Performer
+from runtime.puppet import Puppet
+from runtime.render.context import headless_context, release_headless
+from runtime.theatre import Theatre
+from tests.runtime.figures import ARMS, BODY, FRONT_VIEW, make_figure, pose, record, waving
+
+SIZE = (48, 27)
+
+
+class Kept:
+    """An output that keeps all in memory."""
+
+    def __init__(self, pictures_a_second: float = 0.0, log: list[str] | None = None) -> None:
+        self.pictures_a_second = pictures_a_second
+        self.frames: list[PerformedFrame] = []
+        self.log = log if log is not None else []
+
+    def write(self, frame: PerformedFrame) -> None:
+        self.frames.append(frame)
+        self.log.append(f"{id(self)}:{frame.index}")
+
+    def close(self) -> None: ...
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None: ...
+
+    @property
+    def pictured(self) -> list[float]:
+        return [frame.time for frame in self.frames if frame.picture is not None]
+
+
+class Tape:
+    """A recorder in memory."""
+
+    def __init__(self) -> None:
+        self.frames: list[SkeletonFrame] = []
+
+    def write(self, frame: SkeletonFrame) -> None:
+        self.frames.append(frame)
+
+
+@pytest.fixture(scope="module")
+def puppet() -> Puppet:
+    return Puppet(make_figure())
+
+
+@pytest.fixture(scope="module")
+def context() -> Iterator[moderngl.Context]:
+    try:
+        context = headless_context()
+    except InputError as error:
+        pytest.skip(str(error))
+    yield context
+    release_headless(context)
+
+
+def loop_of(  # what every show needs, with what a test cares for
+    player: Player,
+    puppets: list[Puppet],
+    outputs: list[list[Kept]],
+    *,
+    report: Report | None = None,
+    theatre: Theatre | None = None,
+    recorder: Tape | None = None,
+    shown: bool = False,
+) -> FrameLoop:
+    for puppet in puppets:
+        puppet.rest()
+        puppet._solver.reset()
+    performer = Performer(BODY)
+    hands = [Mapping(ARMS)] * len(puppets)
+    return FrameLoop(
+        player,
+        performer,
+        puppets,
+        director=Director(performer, puppets, lambda: FRONT_VIEW, Choices(), hands),
+        report=report or Report(None),
+        theatre=theatre,
+        outputs=outputs,
+        recorder=recorder,
+        shown=shown,
+    )
+
+
+def play(loop: FrameLoop, player: Player) -> int:
+    ticks = 0
+    while not player.ended:
+        ticks += loop.tick()
+    return ticks
+
+
+def test_every_frame_is_performed_exactly_once(puppet: Puppet) -> None:
+    player = Player(record(waving(9)), EveryFrame())
+    kept, tape, report = Kept(), Tape(), Report(None)
+    loop = loop_of(player, [puppet], [[kept]], report=report, recorder=tape)
+    assert play(loop, player) == loop.frames == 9
+    assert not loop.tick(), "and nothing after the end"
+    assert [frame.index for frame in kept.frames] == list(range(9))
+    np.testing.assert_allclose([frame.time for frame in kept.frames], np.arange(9) / 10.0)
+    assert loop.seconds == pytest.approx(0.8)
+    assert report.dropped == 0
+    for index, frame in enumerate(tape.frames):
+        np.testing.assert_array_equal(frame.positions, player.recording.positions[index])
+    heights = np.array([frame.vertices[:, 1].max() for frame in kept.frames])
+    assert heights[4] > heights[0] + 0.2, "the arm is up in the middle"
+    assert heights[8] == pytest.approx(heights[0], abs=0.02)
+    assert all(frame.picture is None for frame in kept.frames)
+
+
+def test_all_stages_are_timed_once_a_frame(puppet: Puppet) -> None:
+    player = Player(record(waving(5)), EveryFrame())
+    report = Report(None)
+    loop = loop_of(player, [puppet], [[Kept()]], report=report)
+    play(loop, player)
+    loop.tick()
+    stages = {name: len(samples) for name, samples in report.times._milliseconds.items()}
+    assert stages == dict.fromkeys(
+        ("poll", "match", "retarget", "deform", "render", "publish", "frame"), 5
+    )
+
+
+def test_outputs_are_called_in_order_each_with_its_own_puppet(puppet: Puppet) -> None:
+    other = Puppet(make_figure(((-0.24, 0.32, -0.16), (0.24, 0.72, 0.16))))
+    log: list[str] = []
+    outputs = [[Kept(log=log), Kept(log=log)], [Kept(log=log)]]
+    player = Player(record(waving(3)), EveryFrame())
+    play(loop_of(player, [puppet, other], outputs), player)
+    order = [id(output) for kept in outputs for output in kept]
+    assert log == [f"{number}:{index}" for index in range(3) for number in order]
+    first, second, third = (output.frames[-1] for kept in outputs for output in kept)
+    assert first is second
+    assert len(first.vertices) == len(puppet.character.vertices)
+    assert len(third.vertices) == len(other.character.vertices) != len(first.vertices)
+
+
+def test_two_replays_are_the_same_to_the_last_bit(puppet: Puppet) -> None:
+    runs = []
+    for _ in range(2):
+        kept = Kept()
+        player = Player(record(waving(5)), EveryFrame())
+        play(loop_of(player, [puppet], [[kept]]), player)
+        runs.append(np.array([frame.vertices for frame in kept.frames]))
+    np.testing.assert_array_equal(*runs)
+
+
+def test_what_a_slow_loop_skips_is_counted_and_recorded(puppet: Puppet) -> None:
+    now = [50.0]
+    player = Player(record(waving(10)), RealTime(clock=lambda: now[0]))
+    kept, tape, report = Kept(), Tape(), Report(None)
+    loop = loop_of(player, [puppet], [[kept]], report=report, recorder=tape)
+    performed = []
+    for step in (0.0, 0.05, 0.06, 0.35, 0.001, 1.0):
+        now[0] += step
+        performed.append(loop.tick())
+    # Due by then: frame 0, none, 1, 2 to 4, none, 5 to 9.
+    assert performed == [True, False, True, True, False, True]
+    assert report.dropped == 2 + 4
+    assert loop.frames + report.dropped == len(tape.frames) == 10
+    np.testing.assert_allclose([f.time - 50.0 for f in kept.frames], [0.0, 0.1, 0.4, 0.9])
+
+
+def two_performers(count: int) -> Recording:
+    """A lead who waves and a bystander who stands, frame by frame in turn."""
+    poses = [still for moving in waving(count) for still in (moving, pose())]
+    return record(poses, rate=20.0, performers=[4, 9] * count)
+
+
+def test_a_bystanders_frames_are_counted_and_move_nothing(puppet: Puppet) -> None:
+    recording = two_performers(5)
+    player = Player(recording, EveryFrame())
+    kept, tape, report = Kept(), Tape(), Report(None)
+    loop = loop_of(player, [puppet], [[kept]], report=report, recorder=tape)
+    assert play(loop, player) == len(recording)
+    assert [frame.performer for frame in tape.frames] == [4, 9] * 5
+    for lead, bystander in zip(kept.frames[::2], kept.frames[1::2], strict=True):
+        np.testing.assert_array_equal(lead.node_positions, bystander.node_positions)
+    assert kept.frames[4].node_positions[:, 1].max() > kept.frames[0].node_positions[:, 1].max()
+
+    now = [0.0]
+    player = Player(recording, RealTime(clock=lambda: now[0]))
+    loop = loop_of(player, [puppet], [[Kept()]], report=report)
+    while not player.ended:
+        loop.tick()
+        now[0] += 0.3
+    assert loop.frames + report.dropped == len(recording), "each performed or dropped"
+
+
+@pytest.mark.parametrize("asked", [(0.0,), (3.0,), (2.0, 7.0), (20.0,), (60.0,), (math.inf, 1.0)])
+def test_pictures_come_as_often_as_asked_for(
+    puppet: Puppet, context: moderngl.Context, asked: tuple[float, ...]
+) -> None:
+    """Of 20 frames a second, unevenly spaced; whoever asks for most sets the pace for all."""
+    theatre = Theatre(context, SIZE, [puppet], BODY)
+    kept = [Kept(rate) for rate in asked]
+    recording = record([pose()] * 20, rate=20.0)
+    recording.times[1:-1] += np.random.default_rng(0).uniform(-0.005, 0.005, 18)
+    player = Player(recording, EveryFrame())
+    play(loop_of(player, [puppet], [kept], theatre=theatre), player)
+    theatre.close()
+    assert kept[0].pictured == kept[-1].pictured
+    assert len(kept[0].frames) == 20
+    gaps = np.diff(kept[0].pictured)
+    if max(asked) == 0.0:
+        assert kept[0].pictured == []
+    elif max(asked) >= 20.0:
+        assert len(gaps) == 19, "there are no more frames than there are"
+    else:
+        assert kept[0].pictured[0] == 0.0
+        assert gaps.max() < 1.0 / max(asked) + 1e-9, "never fewer than asked for"
+        assert gaps.min() > 0.7 / max(asked), "and hardly more"
+    for frame in kept[0].frames:
+        assert frame.picture is None or frame.picture.shape == (27, 48, 4)
+
+
+def test_a_picture_shows_its_own_frame(puppet: Puppet, context: moderngl.Context) -> None:
+    theatre = Theatre(context, SIZE, [puppet], BODY)
+    kept = Kept(math.inf)
+    player = Player(record([*waving(7)[:4], *waving(7)[:4]]), EveryFrame())
+    play(loop_of(player, [puppet], [[kept]], theatre=theatre), player)
+    theatre.close()
+    pictures = [frame.picture.astype(int) for frame in kept.frames]
+    assert np.abs(pictures[3] - pictures[0]).max() > 40, "the arm went up"
+    assert np.abs(pictures[7] - pictures[3]).mean() < np.abs(pictures[3] - pictures[0]).mean()
+
+
+def test_who_looks_sees_every_tick(puppet: Puppet, context: moderngl.Context) -> None:
+    """Also those without a frame: the camera may have moved."""
+    theatre = Theatre(context, SIZE, [puppet], BODY)
+    now = [0.0]
+    player = Player(record(waving(3)), RealTime(clock=lambda: now[0]))
+    loop = loop_of(player, [puppet], [[Kept()]], theatre=theatre, shown=True)
+    assert loop.tick()
+    before = theatre.picture()
+    theatre.camera = theatre.camera.orbit(0.8, 0.2)
+    assert not loop.tick()
+    assert np.abs(theatre.picture().astype(int) - before).max() > 40
+    theatre.close()
