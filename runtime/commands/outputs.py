@@ -11,26 +11,30 @@ from pathlib import Path
 
 from devices.errors import InputError
 from runtime.character import Character
-from runtime.output.export import open_export
+from runtime.output.export import SUFFIXES, open_export
 from runtime.output.frames import Frames
 from runtime.output.output import Output
 from runtime.output.point_cache import PointCache
 from runtime.output.report import Part
-from runtime.output.video import Video
-from runtime.output.whole_file import check_writable
+from runtime.output.video import Video, encoder_for
+from runtime.output.whole_file import check_suffix, check_writable
 
 
 def check_outputs(options: argparse.Namespace) -> None:
     """Make sure that every file of a show can be written, each once and over nothing it reads.
 
     Raises:
-        InputError: a folder is missing, a file cannot be written, or two options name one file.
+        InputError: a folder is missing, a file cannot be written, a suffix is not known, or two
+            options name one file.
     """
     read = list(_read(options))
     written = list(_written(options))
     for option, path in written:
-        if option != "--frames":
-            check_writable(path)
+        check_writable(path / "000000.png" if option == "--frames" and path.is_dir() else path)
+    if options.video is not None:
+        encoder_for(options.video)
+    if options.export is not None:
+        check_suffix(options.export, SUFFIXES)
     for (option, path), (other, taken) in itertools.combinations(read + written, 2):
         if (other, taken) in written and _same(path, taken):
             raise InputError(
@@ -59,12 +63,12 @@ def open_outputs(
     outputs: list[list[Output]] = []
     for name, (character, part) in zip(names, cast, strict=True):
         kept: list[Output] = [part]
-        if options.cache is not None:
-            cache = PointCache(_of(options.cache, name, names), character)
-            kept.append(closing.enter_context(cache))
         if options.export is not None:
             export = open_export(_of(options.export, name, names), character, rate=rate)
             kept.append(closing.enter_context(export))
+        if options.cache is not None:
+            cache = PointCache(_of(options.cache, name, names), character)
+            kept.append(closing.enter_context(cache))
         outputs.append(kept)
     if options.video is not None:
         video = Video(options.video, rate=rate, pictures_a_second=options.fps)

@@ -184,13 +184,16 @@ class _Show:
             self._puppets,
             self._stream.skeleton,
             transparent=self._options.transparent,
+            plain=self._options.plain or self._options.transparent,
         )
         self._closing.callback(theatre.close)
         return theatre
 
     def _call_director(self) -> Director:
         options = self._options
-        theatre, front = self._theatre, front_camera()
+        # Only who sits at the window can walk round the stage; a camera that merely steps back to
+        # have all in view would turn by a rounding error, and the bytes of a cache with it.
+        theatre, front = (self._theatre if self._window else None), front_camera()
         by_hand: list[Mapping | None] = [
             None
             if options.mapping is None

@@ -11,6 +11,8 @@ from runtime.output.output import Output
 from runtime.output.usd_export import UsdExport
 from runtime.output.whole_file import check_suffix
 
+SUFFIXES = (".glb", ".usdc", ".usda", ".bvh")
+
 
 def open_export(path: Path, character: Character, *, rate: float = 30.0) -> Output:
     """The export that the suffix of `path` asks for: .glb, .usda, .usdc or .bvh.
@@ -20,7 +22,7 @@ def open_export(path: Path, character: Character, *, rate: float = 30.0) -> Outp
     Raises:
         InputError: another suffix, a missing library, or the file cannot be written.
     """
-    suffix = check_suffix(path, (".glb", ".usdc", ".usda", ".bvh"))
+    suffix = check_suffix(path, SUFFIXES)
     if suffix == ".glb":
         return GltfExport(path, character)
     if suffix == ".bvh":
