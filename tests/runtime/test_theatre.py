@@ -1,0 +1,222 @@
+"""The house: who stands where, what the camera sees, and the chains that light up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import moderngl
+import numpy as np
+import pytest
+
+from devices.errors import InputError
+from devices.skeleton import Skeleton
+from runtime.mapping import Mapping
+from runtime.performer import Performer, Pose, rest_state
+from runtime.puppet import Body, Motion, Puppet
+from runtime.render.camera import Camera, box_corners
+from runtime.render.context import headless_context, release_headless
+from runtime.theatre import GAP, Theatre
+from tests.runtime.figures import ARMS, BODY, FRONT_VIEW, T_POSE, frame, make_figure, pose
+
+SIZE = (96, 54)
+WIDE = ((0.24, 0.72, -0.16), (1.6, 0.96, 0.16))
+
+
+@pytest.fixture(scope="module")
+def context() -> Iterator[moderngl.Context]:
+    try:
+        context = headless_context()
+    except InputError as error:
+        pytest.skip(str(error))
+    yield context
+    release_headless(context)
+
+
+@pytest.fixture(scope="module")
+def puppets() -> list[Puppet]:
+    return [Puppet(make_figure(name="one")), Puppet(make_figure(WIDE, name="two"))]
+
+
+@pytest.fixture
+def theatres(context: moderngl.Context) -> Iterator[list[Theatre]]:
+    """Where a test puts the theatres that it opens."""
+    opened: list[Theatre] = []
+    yield opened
+    for theatre in opened:
+        theatre.close()
+    assert context.error == "GL_NO_ERROR"
+
+
+def seen(positions: np.ndarray) -> Pose:
+    return Performer(BODY).follow(frame(positions))
+
+
+def rested(puppets: Sequence[Puppet]) -> list[Motion]:
+    """Every puppet driven by both arms, at rest."""
+    start = seen(pose())
+    for puppet in puppets:
+        puppet.rest()
+        puppet._solver.reset()
+        puppet.take(Mapping(ARMS), rest_state(start), FRONT_VIEW, Body())
+    return [puppet.deform() for puppet in puppets]
+
+
+def reach(camera: Camera, boxes: np.ndarray, aspect: float) -> np.ndarray:
+    """How far from the middle (n, 2) the corners of boxes are in the picture, 1 at its edge."""
+    corners = box_corners(np.asarray(boxes))
+    points = np.column_stack([corners, np.ones(len(corners))])
+    clip = points @ (camera.projection(aspect) @ camera.view).T
+    assert (clip[:, 3] > 0.0).all(), "before the camera"
+    return np.abs(clip[:, :2] / clip[:, 3:])
+
+
+def test_those_on_stage_stand_side_by_side(
+    context: moderngl.Context, puppets: list[Puppet], theatres: list[Theatre]
+) -> None:
+    row = [puppets[0], puppets[1], puppets[0]]
+    theatres.append(Theatre(context, SIZE, row, BODY))
+    boxes = theatres[0].stage.boxes
+    gaps = boxes[1:, 0, 0] - boxes[:-1, 1, 0]
+    np.testing.assert_allclose(gaps, GAP, atol=1e-6)
+    assert boxes[0, 0, 0] == pytest.approx(-boxes[-1, 1, 0]), "the row is in the middle"
+    theatres.append(Theatre(context, SIZE, puppets[:1], BODY))
+    vertices = puppets[0].character.vertices
+    alone = [vertices.min(axis=0), vertices.max(axis=0)]
+    np.testing.assert_allclose(theatres[1].stage.boxes[0], alone, atol=1e-6)
+
+
+@pytest.mark.parametrize("size", [SIZE, (40, 90)])
+def test_the_camera_sees_everybody_with_room_to_move(
+    context: moderngl.Context,
+    puppets: list[Puppet],
+    theatres: list[Theatre],
+    size: tuple[int, int],
+) -> None:
+    theatres.append(Theatre(context, size, puppets, BODY))
+    theatre = theatres[0]
+    shares = reach(theatre.camera, theatre.stage.boxes, theatre.stage.aspect)
+    assert shares.max() < 0.8
+    assert shares[:, 0].max() > 0.5 or shares[:, 1].max() > 0.5, "and not from afar"
+
+
+@pytest.mark.parametrize("size", [SIZE, (40, 90)])
+def test_the_camera_sees_all_that_is_filled_in_the_show(
+    context: moderngl.Context,
+    puppets: list[Puppet],
+    theatres: list[Theatre],
+    size: tuple[int, int],
+) -> None:
+    theatres.append(Theatre(context, size, puppets, BODY))
+    theatre = theatres[0]
+    filled = np.array([[[-1.0, 0.0, -0.5], [1.0, 4.0, 0.5]], [[-3.0, 0.0, -2.0], [2.0, 1.0, 2.5]]])
+    theatre.frame_all(filled)
+    places = np.array([actor.position for actor in theatre._actors])
+    shares = reach(theatre.camera, filled + places[:, None], theatre.stage.aspect)
+    assert shares.max() <= 0.8 + 1e-6, "inside the margins"
+    assert shares.max() > 0.7, "which it fills"
+    at_rest = reach(theatre.camera, theatre.stage.boxes, theatre.stage.aspect)
+    assert at_rest.max() <= 0.8 + 1e-6
+    rotation = theatre.camera.view_rotation
+    theatre.frame_all()
+    np.testing.assert_allclose(theatre.camera.view_rotation, rotation, atol=1e-12)
+    closer = reach(theatre.camera, filled + places[:, None], theatre.stage.aspect)
+    assert closer.max() > 0.85, "a guess from the rest poses knows nothing of the show"
+
+
+def test_framing_does_not_move_who_is_framed(
+    context: moderngl.Context, puppets: list[Puppet], theatres: list[Theatre]
+) -> None:
+    theatres.append(Theatre(context, SIZE, puppets, BODY))
+    theatre = theatres[0]
+    before, camera = theatre.stage.boxes.copy(), theatre.camera
+    for _ in range(3):
+        theatre.frame_all()
+    np.testing.assert_array_equal(theatre.stage.boxes, before)
+    np.testing.assert_allclose(theatre.camera.eye, camera.eye, atol=1e-9)
+    np.testing.assert_allclose(theatre.camera.target, camera.target, atol=1e-9)
+
+
+def picture(theatre: Theatre, puppets: Sequence[Puppet], moment: Pose | None) -> np.ndarray:
+    theatre.show(moment, [puppet.deform() for puppet in puppets])
+    return theatre.picture().astype(int)
+
+
+def differ(one: np.ndarray, two: np.ndarray) -> int:
+    """How many pixels differ by more than an eighth of the range."""
+    return int((np.abs(one - two)[..., :3].max(axis=2) > 32).sum())
+
+
+def test_matched_chains_light_up_unless_they_are_hidden(
+    context: moderngl.Context, puppets: list[Puppet], theatres: list[Theatre]
+) -> None:
+    one = puppets[:1]
+    rested(one)
+    theatres.append(Theatre(context, SIZE, one, BODY))
+    theatre = theatres[0]
+    assert theatre.highlights
+    lit = picture(theatre, one, None)
+    theatre.highlights = False
+    dark = picture(theatre, one, None)
+    assert differ(lit, dark) > 20
+    theatre.highlights = True
+    np.testing.assert_array_equal(picture(theatre, one, None), lit)
+    puppet = one[0]
+    puppet.show(Mapping(()))
+    np.testing.assert_array_equal(picture(theatre, one, None), dark)
+
+
+def test_the_mirror_shows_the_performer(
+    context: moderngl.Context, puppets: list[Puppet], theatres: list[Theatre]
+) -> None:
+    one = puppets[:1]
+    rested(one)
+    theatres.append(Theatre(context, SIZE, one, BODY))
+    theatre = theatres[0]
+    without = picture(theatre, one, None)
+    standing = picture(theatre, one, seen(pose()))
+    level = picture(theatre, one, seen(pose(T_POSE)))
+    assert differ(without, standing) > 50
+    assert differ(standing, level) > 2
+    changed = np.argwhere(np.abs(standing - without).max(axis=2) > 32)
+    assert np.ptp(changed[:, 1]) < SIZE[0] / 2, "in a corner, and nowhere else"
+
+
+def test_who_moves_is_seen_moving(
+    context: moderngl.Context, puppets: list[Puppet], theatres: list[Theatre]
+) -> None:
+    rested(puppets)
+    theatres.append(Theatre(context, SIZE, puppets, BODY))
+    theatre = theatres[0]
+    theatre.highlights = False
+    still = picture(theatre, puppets, None)
+    puppets[1].follow(seen(pose({"ShoulderRight": (0.0, 0.0, -1.4)})))
+    moved = picture(theatre, puppets, None)
+    assert differ(still, moved) > 20
+    columns = np.flatnonzero(np.abs(moved - still).max(axis=(0, 2)) > 60)
+    low, high = theatre.stage.boxes[0, :, 0]
+    edge = reach(theatre.camera, np.array([[[low, 0, 0], [high, 1, 0]]]), theatre.stage.aspect)
+    assert columns.min() > SIZE[0] / 2 * (1.0 - edge[:, 0].max()), "beside the first"
+
+
+def test_a_transparent_stage_has_neither_house_nor_mirror_nor_chains(
+    context: moderngl.Context, puppets: list[Puppet], theatres: list[Theatre]
+) -> None:
+    one = puppets[:1]
+    rested(one)
+    theatres.append(Theatre(context, SIZE, one, BODY, transparent=True))
+    shown = picture(theatres[0], one, seen(pose()))
+    assert max(shown[0, 0, 3], shown[-1, -1, 3]) <= 2
+    assert 0.02 < (shown[..., 3] > 128).mean() < 0.6
+    np.testing.assert_array_equal(shown, picture(theatres[0], one, None))
+
+
+def test_any_performer_fits_into_the_mirror(
+    context: moderngl.Context, puppets: list[Puppet], theatres: list[Theatre]
+) -> None:
+    one = puppets[:1]
+    rested(one)
+    one[0].show(Mapping(()))
+    lone = Skeleton(("only",), np.array([-1]), np.zeros((1, 3)))
+    theatres.append(Theatre(context, SIZE, one, lone))
+    moment = Performer(lone).follow(frame(np.array([[0.0, 1.0, 0.0]])))
+    assert picture(theatres[0], one, moment).shape == (54, 96, 4)
