@@ -25,9 +25,8 @@ from runtime.render.context import headless_context, is_software, release_headle
 from runtime.theatre import Theatre
 
 EXTRAS = {
-    "characters": ("pygel3d", "fast_simplification", "manifold3d", "meshio"),
+    "characters": ("pygel3d", "fast_simplification", "manifold3d"),
     "video": ("av",),
-    "panel": ("imgui_bundle",),
     "usd": ("pxr",),
     "bench": ("igl",),
 }
@@ -101,7 +100,7 @@ def _extra(extra: str, modules: tuple[str, ...]) -> str:
     for module in modules:
         try:
             importlib.import_module(module)
-        except ImportError:
+        except (ImportError, OSError):  # OSError: a system library that the module needs
             missing.append(module)
     if missing:
         hint = f"pip install 'bunraku[{extra}]'"
