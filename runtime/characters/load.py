@@ -118,6 +118,11 @@ def _extracted(vertices: NDArray[np.float64], faces: NDArray[np.int64], path: Pa
             f"{path}: a skeleton for a mesh without a rig needs the extra ({error.name}): "
             "pip install 'bunraku[characters]'"
         ) from None
+    except OSError as error:  # PyGEL3D links libraries that a bare system lacks
+        raise InputError(
+            f"{path}: a skeleton for a mesh without a rig needs system libraries ({error}); "
+            "on Debian or Ubuntu: apt-get install libgl1 libx11-6"
+        ) from None
     names = tuple(f"node{index}" for index in range(len(parents)))
     return Skeleton(names, parents, positions)
 
