@@ -198,16 +198,28 @@ def test_who_moves_is_seen_moving(
     assert columns.min() > SIZE[0] / 2 * (1.0 - edge[:, 0].max()), "beside the first"
 
 
-def test_a_transparent_stage_has_neither_house_nor_mirror_nor_chains(
+def test_a_plain_picture_has_neither_mirror_nor_chains(
     context: moderngl.Context, puppets: list[Puppet], theatres: list[Theatre]
 ) -> None:
     one = puppets[:1]
     rested(one)
-    theatres.append(Theatre(context, SIZE, one, BODY, transparent=True))
+    theatres.append(Theatre(context, SIZE, one, BODY, plain=True))
+    theatres.append(Theatre(context, SIZE, one, BODY))
+    plain = picture(theatres[0], one, seen(pose()))
+    np.testing.assert_array_equal(plain, picture(theatres[0], one, None))
+    theatres[1].highlights = False
+    np.testing.assert_array_equal(plain, picture(theatres[1], one, None))
+
+
+def test_a_transparent_stage_shows_the_character_alone(
+    context: moderngl.Context, puppets: list[Puppet], theatres: list[Theatre]
+) -> None:
+    one = puppets[:1]
+    rested(one)
+    theatres.append(Theatre(context, SIZE, one, BODY, transparent=True, plain=True))
     shown = picture(theatres[0], one, seen(pose()))
-    assert max(shown[0, 0, 3], shown[-1, -1, 3]) <= 2
+    assert shown[0, 0, 3] == shown[-1, -1, 3] == 0
     assert 0.02 < (shown[..., 3] > 128).mean() < 0.6
-    np.testing.assert_array_equal(shown, picture(theatres[0], one, None))
 
 
 def test_any_performer_fits_into_the_mirror(

@@ -108,7 +108,9 @@ def soup() -> trimesh.Trimesh:
 
 def loose() -> trimesh.Trimesh:
     """A tentacle with a button, a single triangle and two vertices without a face."""
-    button = trimesh.creation.icosphere(1, 0.02).apply_translation([0.17, 0.8, 0.0])
+    button = trimesh.creation.icosphere(1, 0.02).apply_translation(
+        [0.17, 0.75, 0.0]
+    )  # between two anchors
     button.vertices += np.random.default_rng(2).normal(0.0, 5e-4, button.vertices.shape)
     triangle = trimesh.Trimesh([[0.2, 0.3, 0], [0.25, 0.3, 0], [0.2, 0.35, 0]], [[0, 1, 2]])
     joined = trimesh.util.concatenate([tentacle(), button, triangle])
