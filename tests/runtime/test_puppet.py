@@ -208,6 +208,10 @@ def test_chains_may_lead_away_from_where_the_first_begins(puppet: Puppet) -> Non
     lifted = np.array([0.0, moved[node("ankle.L"), 1], 0.0])  # the other foot meets the floor
     np.testing.assert_allclose(moved[node("ankle.L")], lifted, atol=1e-12)
     assert np.linalg.norm(moved[node("head")] - lifted) > 0.2
+    ends = [node("knee.L"), node("ankle.L")]
+    shin = np.abs(FIGURE.vertices - FIGURE.skeleton.rest_positions[ends].mean(axis=0)).max(axis=1)
+    middle = motion.vertices[shin < 1.6 * BRICK].mean(axis=0)
+    assert np.linalg.norm(middle - motion.node_positions[ends].mean(axis=0)) < 0.03
     away = np.linalg.norm(motion.vertices - FIGURE.vertices - lifted, axis=1)
     assert away[FIGURE.vertices[:, 1] > 1.3].min() > 0.2
     assert away[(FIGURE.vertices[:, 1] == 0.0) & (FIGURE.vertices[:, 0] > 0.0)].max() < 0.1
