@@ -178,13 +178,13 @@ class Puppet:
         Returns:
             (2, 3) [m] least and greatest corner of all that it fills meanwhile, on the stage.
         """
-        owners = self._drives_of_edges()
+        pulls = self._drives_of_edges()
         for _ in range(ROUNDS):
             boxes, stretches = zip(*(self._try(pose) for pose in poses), strict=True)
             stretch = np.array(stretches)
             if np.percentile(stretch, 99.0) <= MOST_STRETCH:
                 break
-            self._hold_back(stretch, owners)
+            self._hold_back(stretch, pulls)
         self._solver.reset()
         for _, retarget in self._retargets:
             retarget.reset()
@@ -200,24 +200,30 @@ class Puppet:
         box = np.array([seen.min(axis=0), seen.max(axis=0)])
         return box, np.abs(lengths / self._rest_lengths - 1.0)
 
-    def _hold_back(self, stretch: Array, owners: Indices) -> None:
+    def _hold_back(self, stretch: Array, pulls: NDArray[np.bool_]) -> None:
         """Make the turns smaller of each drive whose edges, of all E in T poses, are too tight."""
         tight = np.zeros(len(self.gains))
-        for number in range(len(self.gains)):
-            own = stretch[:, (owners == number).any(axis=1)]
+        for number, edges in enumerate(pulls.T):
+            own = stretch[:, edges]
             tight[number] = np.percentile(own, 99.0) if own.size else 0.0
         if tight.max(initial=0.0) <= MOST_STRETCH:  # the fault lies where no limb is: with all
             tight[:] = MOST_STRETCH / LEAST_STEP
         shares = np.clip(MOST_STRETCH / np.maximum(tight, MOST_STRETCH), 0.75, 1.0)
         self.gains *= np.where(shares < 1.0, np.minimum(shares, LEAST_STEP), 1.0)
 
-    def _drives_of_edges(self) -> Indices:
-        """Which drives move the two ends of each edge (E, 2), -1 for none."""
-        drive_of_node = np.full(len(self.tree), -1, dtype=np.int64)
+    def _drives_of_edges(self) -> NDArray[np.bool_]:
+        """Which drives pull at each edge (E, D): they bend it, or move one of its ends only."""
+        bent = np.zeros((len(self.tree), len(self._chains)), dtype=bool)
         for number, chain in enumerate(self._chains):
-            drive_of_node[list(chain[1:])] = number
-        found: Indices = drive_of_node[self._binding.node][self._binding.owner][self._edges]
-        return found
+            bent[list(chain[1:]), number] = True
+        moved = bent.copy()
+        for node in Tree(self._parents, self.tree.positions).order:
+            if self._parents[node] >= 0:
+                moved[node] |= moved[self._parents[node]]
+        bone = np.where(self._bone >= 0, self._bone, self._binding.node)
+        near, far = bone[self._binding.owner][self._edges].T
+        pulls: NDArray[np.bool_] = bent[near] | bent[far] | (moved[near] != moved[far])
+        return pulls
 
     def limb(self, chain: tuple[int, ...]) -> tuple[int, ...]:
         """Give the part of a chain of nodes that lies outside the trunk, two nodes at least."""
