@@ -30,7 +30,7 @@ class Theatre:
         size: width and height of the picture [px].
         puppets: who is on stage, from left to right.
         performer: the skeleton shown in the mirror.
-        transparent: no house and no floor.
+        transparent: no house and no floor, and plain.
         plain: neither the matched chains nor the mirror.
     """
 
@@ -56,8 +56,8 @@ class Theatre:
             )
             for puppet, place in zip(puppets, places, strict=True)
         ]
-        self._inset = None if plain else SkeletonInset(performer.parents)
-        self.highlights = not plain
+        self._inset = None if plain or transparent else SkeletonInset(performer.parents)
+        self.highlights = not (plain or transparent)
         self.camera = front_camera()
         self.frame_all()
 

@@ -184,7 +184,7 @@ class _Show:
             self._puppets,
             self._stream.skeleton,
             transparent=self._options.transparent,
-            plain=self._options.plain or self._options.transparent,
+            plain=self._options.plain,
         )
         self._closing.callback(theatre.close)
         return theatre
