@@ -55,7 +55,8 @@ def _color(said: dict[str, str], *, textured: bool) -> NDArray[np.float32]:
     rgb = _numbers(said.get("Kd", ""))[:3]
     if textured or len(rgb) != 3:
         rgb = [1.0, 1.0, 1.0]
-    return linear_from_srgb(np.array([[*rgb, *(alpha or [1.0])]]))[0]
+    color: NDArray[np.float32] = linear_from_srgb(np.array([[*rgb, *(alpha or [1.0])]]))[0]
+    return color
 
 
 def _numbers(text: str) -> list[float]:

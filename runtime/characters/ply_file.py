@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+from typing import Any
 
 import numpy as np
 
@@ -24,7 +25,7 @@ def read_ply(content: bytes) -> FileMesh:
     count, face_count = _declared(content)
     check_counts(count, face_count)
     try:
-        loaded = trimesh.load(io.BytesIO(content), file_type="ply", process=False)
+        loaded: Any = trimesh.load(io.BytesIO(content), file_type="ply", process=False)
     except Exception as error:  # the parser has no exceptions of its own: any of NumPy's and more
         raise MeshError(f"it is damaged or cut short ({type(error).__name__})") from None
     vertices = np.asarray(loaded.vertices, dtype=np.float64)

@@ -226,7 +226,7 @@ def test_what_is_wrong_is_said_with_where(
 def test_what_is_no_recording_is_not_taken_for_one(tmp_path: Path, content: bytes) -> None:
     path = tmp_path / "actionLabel.txt"
     path.write_bytes(content)
-    with pytest.raises(InputError, match="is not a recording that can be read|is empty"):
+    with pytest.raises(InputError, match=r"is not a recording that can be read|is empty"):
         recognise(path)
 
 

@@ -33,8 +33,7 @@ def test_a_limb_that_leads_into_the_depth_is_neither() -> None:
 @given(st.floats(0.01, 100.0), st.integers(1, 6))
 def test_size_place_and_sampling_do_not_matter(size: float, parts: int) -> None:
     finer = np.concatenate(
-        [np.linspace(a, b, parts, endpoint=False) for a, b in pairwise(BENT)]
-        + [BENT[-1:]]
+        [np.linspace(a, b, parts, endpoint=False) for a, b in pairwise(BENT)] + [BENT[-1:]]
     )
     moved = size * finer + [3.0, -2.0, 5.0]
     assert likeness(moved, BENT, FRONT, FRONT) == pytest.approx(1.0)
