@@ -27,7 +27,7 @@ Indices = NDArray[np.int64]
 STRAIGHT_ON = np.eye(3)  # how a capture device sees its performer
 MOST_STRETCH = 0.4  # of an edge at the 99th percentile, in a rehearsal
 REHEARSED_ITERATIONS = 4  # poses of a rehearsal lie far apart
-ROUNDS = 8  # of a rehearsal, at most
+ROUNDS = 16  # of a rehearsal, at most
 LEAST_STEP = 0.9  # by which a limb is held back in a round
 
 

@@ -118,16 +118,17 @@ def test_damaged_files_perform_or_are_refused_in_one_line(
     shared: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], folder: str
 ) -> None:
     pytest.importorskip("pygel3d", reason="needs the extra bunraku[characters]")
-    recording = shared / "bvh" / "makehuman_walk1.bvh"
+    recording = shared / "kinect" / "v1_msraction3d" / "a18_s01_e01_skeleton3D.txt"
     for number, path in enumerate(sorted((shared / folder).iterdir())):
         if path.stat().st_size > SMALL_FILE:
             continue
-        cache = tmp_path / f"{number}.pc2"
+        cache, report = tmp_path / f"{number}.pc2", tmp_path / f"{number}.json"
         show = ["replay", str(recording), "--character", str(path), "--headless", "--fast"]
-        code = main([*show, "--cache", str(cache)])
+        code = main([*show, "--cache", str(cache), "--report", str(report)])
         told = capsys.readouterr().err
         if code == 0:
             assert np.isfinite(np.frombuffer(cache.read_bytes(), "<f4", offset=32)).all()
+            assert json.loads(report.read_text())["stretch"]["p99"] < 0.5
         else:
             assert (code, told.count("\n")) == (2, 1)
             assert told.startswith("bunraku: error: ")
