@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
-import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
@@ -17,6 +17,9 @@ from runtime.render.camera import front_camera
 from runtime.render.inset import SkeletonInset
 from runtime.render.stage import Stage
 from runtime.render.tubes import PAIR_COLOURS
+
+if TYPE_CHECKING:
+    import moderngl
 
 GAP = 0.18  # metres of floor between two characters
 ROOM = 0.12  # share of its size that a character may move beyond its rest pose and stay in view
