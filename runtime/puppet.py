@@ -16,6 +16,7 @@ from runtime.performer import Pose, Rest
 from solvers.abstraction import abstract
 from solvers.arap import ArapSolver
 from solvers.binding import bind
+from solvers.edges import unique_edges
 from solvers.heading import turned
 from solvers.polyline_motion import ChainRetarget
 from solvers.skeleton_pose import SkeletonPose
@@ -357,12 +358,3 @@ def scaled(rotations: Array, share: float) -> Array:
     half = np.arctan2(sine, rotations[:, 3:])
     axis = rotations[:, :3] / np.maximum(sine, 1e-300)
     return np.hstack([np.sin(share * half) * axis, np.cos(share * half)])
-
-
-def unique_edges(vertices: Array, faces: Indices) -> Indices:
-    """Every edge (E, 2) that has a length, once."""
-    sides = np.sort(np.vstack([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-    edges = np.unique(sides, axis=0)
-    lengths = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
-    kept: Indices = edges[lengths > 1e-12]
-    return kept

@@ -6,6 +6,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from solvers.edges import unique_edges
+
 _BIN = 1e-4  # width of a bin: what p99 is exact to
 _BINS = 100_000  # so stretches up to 10 are told apart; all above count as 10
 
@@ -23,13 +25,10 @@ class StretchStatistic:
     """
 
     def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
-        sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
-        edges = np.unique(sides, axis=0)  # (E, 2)
+        edges = unique_edges(vertices, faces)
         lengths = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
-        extent = np.ptp(vertices, axis=0).max(initial=0.0) if len(vertices) else 0.0
-        kept = lengths > 1e-9 * extent
-        self._edges = np.ascontiguousarray(edges[kept])
-        self._inverse_lengths = 1 / lengths[kept]
+        self._edges = np.ascontiguousarray(edges)
+        self._inverse_lengths = 1 / lengths
         self._histogram = np.zeros(_BINS + 1, np.int64)
         self._sum = 0.0
         # Compiles now, or loads what an earlier run compiled, and not within the first frame.

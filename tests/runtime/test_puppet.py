@@ -13,7 +13,8 @@ from scipy.spatial.transform import Rotation
 from devices.errors import InputError
 from runtime.mapping import Drive, Mapping
 from runtime.performer import Performer, Pose, rest_state
-from runtime.puppet import Body, Motion, Puppet, body_of, scaled, unique_edges
+from runtime.puppet import Body, Motion, Puppet, body_of, scaled
+from solvers.edges import unique_edges
 from solvers.heading import turned
 from tests.runtime.figures import (
     ARMS,
