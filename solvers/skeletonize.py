@@ -1,9 +1,9 @@
 """The curve skeleton of any surface: local separators of its edge graph, made into a clean tree.
 
 A local separator is a small set of vertices whose removal cuts a piece of the surface in two, as a
-ring around an arm does; each becomes a node. Pieces that do not touch are bridged first, thick
-meshes are reduced, and the result is pruned of spurs, merged at crowded forks, smoothed and evenly
-resampled, so that every limb is one chain of bones of similar length.
+ring around an arm does; each becomes a node. Broken surfaces are closed and dense ones reduced
+first; the result is opened at its loops, led on to the tips of the limbs, pruned of spurs, merged
+at crowded forks, smoothed and evenly resampled, so that every limb is one chain of similar bones.
 
 Source: Bærentzen and Rotenberg 2021, "Skeletonization via Local Separators", ACM TOG 40(5), as
 implemented by PyGEL3D; the tree that is made of its graph is our own.
@@ -19,21 +19,38 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
+from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import breadth_first_order, connected_components, minimum_spanning_tree
 from scipy.spatial import cKDTree
 
-VERSION = 1
+from solvers.abstraction import find_root
+from solvers.tree import Tree
+from solvers.voxel_solid import closed_surface, surface_samples
+
+VERSION = 2
 """Changes whenever the same surface would give another skeleton; part of the key of a cache."""
 
-GRAPH_VERTICES = 2000
-MOST_PIECES = 64
 MOST_NODES = 200
-BONES = 60
-SPUR = 1.2
-CROWDED = 0.75
-CHAIN_BONES = (3, 12)
-STRAIGHT_BONES = 4
+
+# Lengths are shares of the longest side of the surface's box, radii those of the largest ball
+# around a node that stays inside the surface.
+_GRAPH_VERTICES = 1200  # separators cost more than linear time
+_MOST_PIECES = 64
+_SAME = 1e-5  # vertices closer than this are one
+_FEWEST = 24  # with fewer vertices there are no rings around limbs
+_FLAT = 1e-3  # a surface thinner than this is a sheet
+_OPENINGS = 2  # more, and together longer than _OPEN times the root of the area, and there is
+_OPEN = 1.5  # no clear inside
+_SPACING = 1 / 64  # of the samples that tell how far the surface is
+_SPUR = 2.0  # a limb is at least so many times as long as its largest radius, to its tip
+_SHORTEST = 0.04  # and at least this
+_CONE = 0.5  # cosine of the angle in which a tip lies ahead of a leaf
+_TIP = 0.9  # the share of what surrounds a leaf that lies before its tip
+_STUB = 3.0  # a loop whose ends are no more radii of their fork long is no hole
+_CROWDED = 1.0  # forks closer than so many radii are one
+_BONES = 60
+_LIMB_BONES = (3, 12)
+_STRAIGHT_BONES = 4
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
@@ -42,11 +59,10 @@ Chain = list[int]
 
 @dataclass(frozen=True, slots=True)
 class _Graph:
-    """An undirected graph in space: positions (n, 3), edges (e, 2), local thickness (n,)."""
+    """An undirected graph in space: positions (n, 3) and edges (e, 2)."""
 
     positions: FloatArray
     edges: IntArray
-    radii: FloatArray
 
     def neighbours(self) -> list[list[int]]:
         lists: list[list[int]] = [[] for _ in self.positions]
@@ -60,8 +76,8 @@ def extract_skeleton(vertices: FloatArray, faces: IntArray) -> tuple[IntArray, F
     """A tree of nodes inside the surface: parents (K,), -1 for the root, and positions (K, 3).
 
     Works for closed, open, flat, broken and non-manifold surfaces and for several components; the
-    same arrays always give the same tree, of 2 to `MOST_NODES` nodes. The root is the node nearest
-    to the centre of the surface; every parent comes before its children.
+    same arrays always give the same tree, of 2 to `MOST_NODES` nodes. Every parent comes before
+    its children.
 
     Args:
         vertices: (N, 3), any unit and frame; vertices that no face uses do not count.
@@ -71,75 +87,123 @@ def extract_skeleton(vertices: FloatArray, faces: IntArray) -> tuple[IntArray, F
         ValueError: there is no face, or a vertex that is used is not finite.
         ImportError: PyGEL3D or fast_simplification is not installed.
 
-    Source: Bærentzen and Rotenberg 2021, sections 3 and 4.
+    Source: Bærentzen and Rotenberg 2021, sections 3 and 4; the root is AniMesh's, section 4.1.
     """
     used, compact = np.unique(faces, return_inverse=True)
     points = np.asarray(vertices, dtype=np.float64)[used]
-    triangles = compact.reshape(-1, 3)
-    if len(triangles) == 0 or not np.isfinite(points).all():
+    if len(points) == 0 or not np.isfinite(points).all():
         raise ValueError("Expected `faces` not to be empty and `vertices` to be finite")
-    middle = (points.min(axis=0) + points.max(axis=0)) / 2
-    size = float(np.ptp(points, axis=0).max()) or 1.0
+    scale = float(np.abs(points).max()) or 1.0
+    points = points / scale
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle = (low + high) / 2
+    size = float((high - low).max()) or 1.0
     points = (points - middle) / size
-    triangles = _without_slivers(points, triangles)
-    centre = _area_centroid(points, triangles)
-    reduced_points, reduced = _reduced(points, triangles)
-    tree = _tree_of(_surface_graph(reduced_points, reduced), reduced_points)
-    if tree is None:
-        tree = _principal_axis(points)
-    parents, positions = _rooted(tree, centre)
-    return parents, positions * size + middle
+    tree = _limbs(*_welded(points, compact.reshape(-1, 3)))
+    parents, positions = _rooted(tree or _principal_axis(points))
+    return parents, (positions * size + middle) * scale
 
 
-def _without_slivers(points: FloatArray, triangles: IntArray) -> IntArray:
+def _welded(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
+    """The surface with one vertex where there were several, without faces that have no area."""
+    _, first, group = np.unique(
+        np.round(points / _SAME), axis=0, return_index=True, return_inverse=True
+    )
+    triangles = group.reshape(-1)[triangles]
     a, b, c = triangles.T
-    proper = triangles[(a != b) & (b != c) & (c != a)]
-    return proper if len(proper) else triangles
+    return _unpinched(points[first], triangles[(a != b) & (b != c) & (c != a)])
 
 
-def _area_centroid(points: FloatArray, triangles: IntArray) -> FloatArray:
+def _unpinched(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
+    """The surface with one vertex a fan of faces: knees that touch in a point are two knees."""
+    corners = np.arange(triangles.size).reshape(-1, 3)
+    pairs = corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    ends = triangles.reshape(-1)[pairs]
+    pairs = np.take_along_axis(pairs, np.argsort(ends, axis=1), axis=1)
+    ends.sort(axis=1)
+    order = np.lexsort(ends.T)
+    shared = (ends[order][1:] == ends[order][:-1]).all(axis=1)
+    links = np.stack([pairs[order][:-1][shared], pairs[order][1:][shared]], axis=-1)
+    fans: IntArray = _labels(triangles.size, links.reshape(-1, 2))
+    _, first = np.unique(fans, return_index=True)
+    return points[triangles.reshape(-1)[first]], fans.reshape(-1, 3)
+
+
+def _limbs(points: FloatArray, triangles: IntArray) -> _Graph | None:
+    """The clean tree of a surface, or None where there is nothing like a limb in it."""
+    if len(points) < _FEWEST:
+        return None
+    border = _borders(triangles)
+    flat = np.ptp(points @ _axes(points)[2]) < _FLAT
+    if not flat and not _has_inside(points, triangles, border):
+        points, triangles = closed_surface(points, triangles)
+    outline = np.column_stack([border, border[:, 0]]) if flat and len(border) else triangles
+    outside = cKDTree(surface_samples(points, outline, _SPACING))
+    surface = _surface_graph(*_reduced(points, triangles))
+    tree = _opened(*_local_separators(surface), outside)
+    tree = _pruned(tree, surface, outside)
+    tree = _pruned(_forks_merged(tree, outside), surface, outside)
+    if len(tree.positions) < 2:
+        return None
+    tree = _resampled(_smoothed(_with_tips(tree, surface)))
+    longest = np.ptp(tree.positions, axis=0).max()
+    return tree if longest >= 0.25 * np.ptp(points, axis=0).max() else None
+
+
+def _axes(points: FloatArray) -> FloatArray:
+    """The principal axes of the points, the longest first, as rows."""
+    centred = points - points.mean(axis=0)
+    return np.asarray(np.linalg.eigh(centred.T @ centred)[1].T[::-1])
+
+
+def _borders(triangles: IntArray) -> IntArray:
+    """The edges (b, 2) that do not lie between exactly two faces."""
+    sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    edges, faces = np.unique(sides, axis=0, return_counts=True)
+    return np.asarray(edges[faces != 2], dtype=np.int64)
+
+
+def _has_inside(points: FloatArray, triangles: IntArray, border: IntArray) -> bool:
+    """Whether the surface is one piece but for details, with few or small openings."""
+    open_length = np.linalg.norm(points[border[:, 0]] - points[border[:, 1]], axis=1).sum()
     corners = points[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    areas = np.linalg.norm(normals, axis=1)
-    if areas.sum() < 1e-12:
-        centre: FloatArray = points.mean(axis=0)
-        return centre
-    return np.asarray(np.average(corners.mean(axis=1), axis=0, weights=areas))
+    area = 0.5 * np.linalg.norm(normals, axis=1).sum()
+    labels = _labels(len(points), np.vstack([triangles[:, :2], triangles[:, 1:]]))
+    pieces = len(np.unique(labels[_significant(points, labels)]))
+    openings = len(np.unique(_labels(len(points), border)[border]))
+    return pieces == 1 and bool(openings <= _OPENINGS or open_length < _OPEN * np.sqrt(area))
 
 
 def _reduced(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
-    """The surface with about `GRAPH_VERTICES` vertices: separators cost more than linear time."""
-    if len(points) <= GRAPH_VERTICES * 1.2:
+    """The surface with about `_GRAPH_VERTICES` vertices."""
+    if len(points) <= _GRAPH_VERTICES:
         return points, triangles
-    import fast_simplification  # noqa: PLC0415  (an optional extra)
-
+    try:
+        import fast_simplification  # noqa: PLC0415  (an optional extra)
+    except ImportError as error:
+        raise ImportError("curve skeletons need: pip install 'bunraku[characters]'") from error
     fewer_points, fewer = fast_simplification.simplify(
         np.ascontiguousarray(points, dtype=np.float32),
         np.ascontiguousarray(triangles, dtype=np.int32),
-        target_count=2 * GRAPH_VERTICES,
+        target_count=2 * _GRAPH_VERTICES,
     )
     used, compact = np.unique(fewer, return_inverse=True)
-    return fewer_points[used].astype(np.float64), compact.reshape(-1, 3).astype(np.int64)
+    if len(used) == 0:
+        return points, triangles
+    return _unpinched(fewer_points[used].astype(np.float64), compact.reshape(-1, 3))
 
 
 def _surface_graph(points: FloatArray, triangles: IntArray) -> _Graph:
-    """The surface's edges; pieces that touch or lie in one another are tied together."""
-    edges = _unique_edges(np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]],
-                                     triangles[:, [2, 0]]]))
+    """The surface's edges; pieces that do not touch are tied together where they come closest."""
+    edges = _unique_edges(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2))
     labels = _labels(len(points), edges)
     kept = _significant(points, labels)
-    if len(kept) < len(points):
-        renumber = np.full(len(points), -1)
-        renumber[kept] = np.arange(len(kept))
-        edges = renumber[edges]
-        edges, points, labels = edges[(edges >= 0).all(axis=1)], points[kept], labels[kept]
-    if labels.max() != labels.min():
-        lengths = np.linalg.norm(points[edges[:, 0]] - points[edges[:, 1]], axis=1)
-        pairs = cKDTree(points).query_pairs(float(np.median(lengths)), output_type="ndarray")
-        pairs = pairs[labels[pairs[:, 0]] != labels[pairs[:, 1]]]
-        edges = _unique_edges(np.vstack([edges, pairs]))
-        edges = np.vstack([edges, _bridges(points, _labels(len(points), edges))])
-    return _Graph(points, edges, np.zeros(len(points)))
+    renumber = np.full(len(points), -1)
+    renumber[kept] = np.arange(len(kept))
+    edges = renumber[edges]
+    edges = edges[(edges >= 0).all(axis=1)]
+    return _Graph(points[kept], np.vstack([edges, _bridges(points[kept], labels[kept])]))
 
 
 def _unique_edges(pairs: IntArray) -> IntArray:
@@ -147,9 +211,13 @@ def _unique_edges(pairs: IntArray) -> IntArray:
 
 
 def _labels(count: int, edges: IntArray) -> IntArray:
-    ones = np.ones(len(edges))
-    links = coo_array((ones, (edges[:, 0], edges[:, 1])), shape=(count, count))
+    links = _matrix(count, edges, np.ones(len(edges)))
     return np.asarray(connected_components(links, directed=False)[1], dtype=np.int64)
+
+
+def _matrix(count: int, edges: IntArray, values: FloatArray) -> csr_array:
+    links = coo_array((values, (edges[:, 0], edges[:, 1])), shape=(count, count))
+    return csr_array(links)
 
 
 def _significant(points: FloatArray, labels: IntArray) -> IntArray:
@@ -159,7 +227,7 @@ def _significant(points: FloatArray, labels: IntArray) -> IntArray:
     np.minimum.at(low, labels, points)
     np.maximum.at(high, labels, points)
     sizes = np.linalg.norm(high - low, axis=1)
-    ranked = np.argsort(-sizes, kind="stable")[:MOST_PIECES]
+    ranked = np.argsort(-sizes, kind="stable")[:_MOST_PIECES]
     large = ranked[sizes[ranked] >= 0.05 * np.linalg.norm(np.ptp(points, axis=0))]
     return np.flatnonzero(np.isin(labels, large if len(large) else ranked[:1]))
 
@@ -179,23 +247,6 @@ def _bridges(points: FloatArray, labels: IntArray) -> IntArray:
     joined = minimum_spanning_tree(gaps).tocoo()
     pairs = [ends[i, j] for i, j in zip(joined.row.tolist(), joined.col.tolist(), strict=True)]
     return np.array(pairs, dtype=np.int64).reshape(-1, 2)
-
-
-def _tree_of(surface: _Graph, points: FloatArray) -> _Graph | None:
-    """The clean tree of a surface's graph, or None where there is nothing like a limb in it."""
-    positions, edges = _local_separators(surface)
-    if len(positions) < 2:
-        return None
-    tree = _spanning_tree(positions, edges, surface.positions)
-    tree = _pruned(tree)
-    tree = _forks_merged(tree)
-    tree = _pruned(tree)
-    tree = _resampled(_smoothed(tree))
-    if len(tree.positions) < 2 or np.ptp(tree.positions, axis=0).max() < 0.25 * np.ptp(
-        points, axis=0
-    ).max():
-        return None
-    return tree
 
 
 def _local_separators(surface: _Graph) -> tuple[FloatArray, IntArray]:
@@ -241,24 +292,48 @@ def _quiet_stdout() -> Iterator[None]:
         os.close(nowhere)
 
 
-def _spanning_tree(positions: FloatArray, edges: IntArray, surface: FloatArray) -> _Graph:
-    """One tree over all nodes; a loop around a hole is opened at its longest edge."""
+def _opened(positions: FloatArray, edges: IntArray, outside: cKDTree) -> _Graph:
+    """One tree over all nodes; a loop is opened at its longest edge.
+
+    Around a real hole that leaves two limbs. A small loop is one of separators inside a thick
+    part, and the ends that are left of it are cut back to where they fork.
+    """
     edges = np.vstack([edges, _bridges(positions, _labels(len(positions), edges))])
     lengths = np.linalg.norm(positions[edges[:, 0]] - positions[edges[:, 1]], axis=1) + 1e-9
-    count = len(positions)
-    links = coo_array((lengths, (edges[:, 0], edges[:, 1])), shape=(count, count)).tocsr()
-    tree = minimum_spanning_tree(links).tocoo()
-    kept = np.stack([tree.row, tree.col], axis=1).astype(np.int64)
-    return _Graph(positions, kept, _thickness(positions, surface))
+    spanning = minimum_spanning_tree(_matrix(len(positions), edges, lengths)).tocoo()
+    kept = np.stack([spanning.row, spanning.col], axis=1).astype(np.int64)
+    tree = _Graph(positions, kept)
+    neighbours = tree.neighbours()
+    radii = outside.query(positions)[0]
+    cut = set(map(tuple, np.sort(edges).tolist())) - set(map(tuple, np.sort(kept).tolist()))
+    ends = {node for edge in cut for node in edge}
+    stubs: set[int] = set()
+    for run in _tip_chains(neighbours):
+        if run[-1] in ends and _length(positions, run) < _STUB * radii[run[0]]:
+            stubs.update(run[1:])
+    return _without(tree, sorted(stubs))
 
 
-def _thickness(positions: FloatArray, surface: FloatArray) -> FloatArray:
-    """Mean distance (n,) from each node to the surface vertices nearest to it of all nodes."""
-    distance, nearest = cKDTree(positions).query(surface)
-    owned = np.bincount(nearest, minlength=len(positions))
-    total = np.bincount(nearest, weights=distance, minlength=len(positions))
-    alone = cKDTree(surface).query(positions)[0]
-    return np.where(owned > 0, total / np.maximum(owned, 1), alone)
+def _with_tips(tree: _Graph, surface: _Graph) -> _Graph:
+    """With every leaf led on to the tip of its limb, on the surface around it."""
+    neighbours = tree.neighbours()
+    owner = cKDTree(tree.positions).query(surface.positions)[1]
+    own = owner[surface.edges[:, 0]] == owner[surface.edges[:, 1]]
+    patch = _labels(len(owner), surface.edges[own])
+    positions = tree.positions.copy()
+    for leaf, near in enumerate(neighbours):
+        if len(near) != 1 or not (owner == leaf).any():
+            continue
+        ahead = positions[leaf] - tree.positions[near[0]]
+        owned = np.flatnonzero(owner == leaf)
+        away = np.linalg.norm(surface.positions[owned] - positions[leaf], axis=1)
+        around = surface.positions[patch == patch[owned[np.argmin(away)]]] - positions[leaf]
+        reach = around @ (ahead / max(float(np.linalg.norm(ahead)), 1e-12))
+        straight = reach >= _CONE * np.linalg.norm(around, axis=1)
+        if straight.any():
+            tip = reach >= np.quantile(reach[straight], _TIP)
+            positions[leaf] += around[straight & tip].mean(axis=0)
+    return _Graph(positions, tree.edges)
 
 
 def _chains(neighbours: list[list[int]]) -> list[Chain]:
@@ -280,22 +355,36 @@ def _length(positions: FloatArray, chain: Chain) -> float:
     return float(np.linalg.norm(np.diff(positions[chain], axis=0), axis=1).sum())
 
 
-def _pruned(tree: _Graph) -> _Graph:
-    """Without spurs: tips that hardly leave the thickness of the fork they grow from."""
+def _pruned(tree: _Graph, surface: _Graph, outside: cKDTree) -> _Graph:
+    """Without spurs: limbs that, led on to their tips, are hardly longer than thick.
+
+    All spurs of a fork go at once, so that a head does not end in the longer one of its ears.
+    """
     while True:
-        neighbours = tree.neighbours()
-        spurs = []
-        for chain in _chains(neighbours):
-            tips = [len(neighbours[chain[0]]) == 1, len(neighbours[chain[-1]]) == 1]
-            if tips[0] == tips[1]:
-                continue
-            run = chain if tips[1] else chain[::-1]
-            length = _length(tree.positions, run)
-            if length < max(SPUR * tree.radii[run[0]], 0.03):
-                spurs.append((length, run))
+        whole = _with_tips(tree, surface)
+        radii = _thickness(tree, outside)
+        spurs: set[int] = set()
+        for run in _tip_chains(tree.neighbours()):
+            if _length(whole.positions, run) < max(_SPUR * radii[run].max(), _SHORTEST):
+                spurs.update(run[1:])
         if not spurs:
             return tree
-        tree = _without(tree, min(spurs)[1][1:])
+        tree = _without(tree, sorted(spurs))
+
+
+def _thickness(tree: _Graph, outside: cKDTree) -> FloatArray:
+    """Radius (n,) of the largest ball inside the surface around each node or one beside it."""
+    radii = np.asarray(outside.query(tree.positions)[0], dtype=np.float64)
+    thickness = radii.copy()
+    for one, other in (tree.edges.T, tree.edges.T[::-1]):
+        np.maximum.at(thickness, one, radii[other])
+    return thickness
+
+
+def _tip_chains(neighbours: list[list[int]]) -> list[Chain]:
+    """The chains that lead from a fork to a tip, in this direction."""
+    both = [run for chain in _chains(neighbours) for run in (chain, chain[::-1])]
+    return [run for run in both if len(neighbours[run[0]]) > 2 and len(neighbours[run[-1]]) == 1]
 
 
 def _without(tree: _Graph, nodes: list[int]) -> _Graph:
@@ -303,18 +392,19 @@ def _without(tree: _Graph, nodes: list[int]) -> _Graph:
     keep[nodes] = False
     renumber = np.cumsum(keep) - 1
     edges = renumber[tree.edges[keep[tree.edges].all(axis=1)]]
-    return _Graph(tree.positions[keep], edges, tree.radii[keep])
+    return _Graph(tree.positions[keep], edges)
 
 
-def _forks_merged(tree: _Graph) -> _Graph:
+def _forks_merged(tree: _Graph, outside: cKDTree) -> _Graph:
     """With forks that lie within one another's thickness made into one, as where arms meet."""
     while True:
         neighbours = tree.neighbours()
+        radii = outside.query(tree.positions)[0]
         crowded = []
         for chain in _chains(neighbours):
             if min(len(neighbours[chain[0]]), len(neighbours[chain[-1]])) > 2:
                 length = _length(tree.positions, chain)
-                if length < CROWDED * min(tree.radii[chain[0]], tree.radii[chain[-1]]):
+                if length < _CROWDED * max(radii[chain[0]], radii[chain[-1]]):
                     crowded.append((length, chain))
         if not crowded:
             return tree
@@ -322,13 +412,11 @@ def _forks_merged(tree: _Graph) -> _Graph:
 
 
 def _contracted(tree: _Graph, chain: Chain) -> _Graph:
-    positions, radii = tree.positions.copy(), tree.radii.copy()
+    positions = tree.positions.copy()
     positions[chain[0]] = tree.positions[[chain[0], chain[-1]]].mean(axis=0)
-    radii[chain[0]] = tree.radii[[chain[0], chain[-1]]].max()
     renumber = np.arange(len(positions))
     renumber[chain] = chain[0]
-    merged = _Graph(positions, _unique_edges(renumber[tree.edges]), radii)
-    return _without(merged, chain[1:])
+    return _without(_Graph(positions, _unique_edges(renumber[tree.edges])), chain[1:])
 
 
 def _smoothed(tree: _Graph) -> _Graph:
@@ -341,7 +429,7 @@ def _smoothed(tree: _Graph) -> _Graph:
     near = np.array([neighbours[node] for node in inner])
     for _ in range(3):
         positions[inner] = (positions[inner] + positions[near].mean(axis=1)) / 2
-    return _Graph(positions, tree.edges, tree.radii)
+    return _Graph(positions, tree.edges)
 
 
 def _resampled(tree: _Graph) -> _Graph:
@@ -356,16 +444,16 @@ def _resampled(tree: _Graph) -> _Graph:
     edges = []
     for chain in chains:
         inner = min(len(neighbours[chain[0]]), len(neighbours[chain[-1]])) > 2
-        least = 1 if inner else CHAIN_BONES[0]
-        wanted = round(BONES * _length(tree.positions, chain) / max(total, 1e-12))
-        bones = int(min(max(wanted, least), CHAIN_BONES[1], room))
+        least = 1 if inner else _LIMB_BONES[0]
+        wanted = round(_BONES * _length(tree.positions, chain) / max(total, 1e-12))
+        bones = int(min(max(wanted, least), _LIMB_BONES[1], room))
         last = renumber[chain[0]]
         for point in _evenly(tree.positions[chain], bones)[1:-1]:
             edges.append((last, len(positions)))
             last = len(positions)
             positions.append(point)
         edges.append((last, renumber[chain[-1]]))
-    return _Graph(np.array(positions), np.array(edges, dtype=np.int64), np.zeros(len(positions)))
+    return _Graph(np.array(positions), np.array(edges, dtype=np.int64))
 
 
 def _evenly(polyline: FloatArray, bones: int) -> FloatArray:
@@ -377,21 +465,26 @@ def _evenly(polyline: FloatArray, bones: int) -> FloatArray:
 
 def _principal_axis(points: FloatArray) -> _Graph:
     """A straight chain along the longest axis of a lump that has no limbs."""
-    centred = points - points.mean(axis=0)
-    axis = np.linalg.svd(centred, full_matrices=False)[2][0]
+    axis = _axes(points)[0]
     axis = axis * np.sign(axis[np.argmax(np.abs(axis))])
-    along = centred @ axis
-    at = np.linspace(along.min(), along.max(), STRAIGHT_BONES + 1)
+    along = (points - points.mean(axis=0)) @ axis
+    at = np.linspace(along.min(), along.max(), _STRAIGHT_BONES + 1)
     positions = points.mean(axis=0) + at[:, None] * axis
-    edges = np.stack([np.arange(STRAIGHT_BONES), np.arange(1, STRAIGHT_BONES + 1)], axis=1)
-    return _Graph(positions, edges.astype(np.int64), np.zeros(len(positions)))
+    edges = np.stack([np.arange(_STRAIGHT_BONES), np.arange(1, _STRAIGHT_BONES + 1)], axis=1)
+    return _Graph(positions, edges.astype(np.int64))
 
 
-def _rooted(tree: _Graph, centre: FloatArray) -> tuple[IntArray, FloatArray]:
-    root = int(np.argmin(np.linalg.norm(tree.positions - centre, axis=1)))
+def _rooted(tree: _Graph) -> tuple[IntArray, FloatArray]:
+    """Parents and positions from the root of AniMesh's hierarchy, every parent first."""
+    parents, positions = _ordered(tree, 0)
+    root = find_root(Tree(parents, positions))[0]
+    return _ordered(tree, int(np.flatnonzero((tree.positions == positions[root]).all(axis=1))[0]))
+
+
+def _ordered(tree: _Graph, root: int) -> tuple[IntArray, FloatArray]:
+    """Parents and positions of the nodes in the order that a walk from `root` meets them."""
     count = len(tree.positions)
-    ones = np.ones(len(tree.edges))
-    links = coo_array((ones, (tree.edges[:, 0], tree.edges[:, 1])), shape=(count, count)).tocsr()
+    links = _matrix(count, tree.edges, np.ones(len(tree.edges)))
     order, before = breadth_first_order(links, root, directed=False)
     place = np.empty(count, dtype=np.int64)
     place[order] = np.arange(count)

@@ -1,0 +1,101 @@
+"""The solid that a broken surface stands for: walled-in voxels, closed again.
+
+Triangle soups, shells with holes and overlapping pieces have no clear inside. Here a voxel belongs
+to the solid if the surface passes through it, or if a wall is met in at least five of the six
+directions along the axes: a hole on one side, as under a car, does not let the inside out.
+
+Source: the vote over axis-parallel rays of Nooruddin and Turk 2003, "Simplification and Repair of
+Polygonal Models Using Volumetric Techniques", IEEE TVCG 9(2), section 3.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+FINEST = 80
+"""Voxels along the longest side, at most; large or tangled surfaces get fewer."""
+
+_MOST_SAMPLES = 400_000
+_WALLS = 5  # of the six directions in which a voxel inside must meet a wall
+_MARGIN = 3  # voxels of air around the solid
+_BLUR = 0.7  # standard deviation [voxel] that takes the steps off the surface
+_LEVEL = 0.3  # of the blurred solid: keeps walls (0.57) and wires (0.33) of one voxel
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int64]
+
+
+def surface_samples(points: FloatArray, triangles: IntArray, spacing: float) -> FloatArray:
+    """Points (S, 3) on triangles (F, 3) of points (N, 3): none of the surface is `spacing` away.
+
+    The spacing [the unit of `points`] grows where it would give more than some 10^6 samples.
+    """
+    corners = points[triangles]
+    longest = _sides(corners).max(axis=1)
+    # A triangle is halved until it is small: n times as long makes up to n^2 of it.
+    area = 0.5 * np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    )
+    spacing = max(spacing, longest.sum() / _MOST_SAMPLES, np.sqrt(area.sum() / _MOST_SAMPLES))
+    found = []
+    while len(corners):
+        sides = _sides(corners)
+        small = sides.max(axis=1) <= spacing
+        found.append(corners[small].mean(axis=1))
+        found.append(corners[small].reshape(-1, 3))
+        corners = _halved(corners[~small], sides[~small])
+    return np.concatenate(found)
+
+
+def _sides(corners: FloatArray) -> FloatArray:
+    """Lengths (F, 3) of the side from each corner to the next."""
+    lengths: FloatArray = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+    return lengths
+
+
+def _halved(corners: FloatArray, sides: FloatArray) -> FloatArray:
+    """Triangles (2 F, 3, 3): each cut in the middle of its longest side."""
+    first = np.argmax(sides, axis=1)
+    a, b, c = (corners[np.arange(len(corners)), (first + k) % 3] for k in range(3))
+    middle = (a + b) / 2
+    return np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])
+
+
+def closed_surface(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
+    """A closed surface, vertices (n, 3) and faces (m, 3), around the solid of a broken one.
+
+    Args:
+        points: (N, 3) finite, any unit; the longest side of their box is not 0.
+        triangles: (F, 3) into `points`; any soup.
+
+    Raises:
+        ImportError: PyGEL3D is not installed.
+    """
+    try:
+        from pygel3d import hmesh  # noqa: PLC0415  (an optional extra)
+    except ImportError as error:
+        raise ImportError("curve skeletons need: pip install 'bunraku[characters]'") from error
+    low = points.min(axis=0)
+    size = float(np.ptp(points, axis=0).max())
+    samples = surface_samples(points, triangles, 0.7 * size / FINEST)
+    voxel = size / FINEST
+    cells = np.floor((samples - low) / voxel).astype(np.int64) + _MARGIN
+    shell = np.zeros(cells.max(axis=0) + 1 + _MARGIN, dtype=bool)
+    shell[tuple(cells.T)] = True
+    field = gaussian_filter(_filled(shell).astype(np.float32), _BLUR)
+    last = np.array(field.shape) - 1.0  # so that a vertex is given in voxels, centre to centre
+    manifold = hmesh.volumetric_isocontour(field, bbox_max=last, tau=_LEVEL)
+    vertices = np.array(manifold.positions(), dtype=np.float64)
+    faces = np.array([manifold.circulate_face(f, mode="v") for f in manifold.faces()])
+    return (vertices - _MARGIN + 0.5) * voxel + low, faces.astype(np.int64).reshape(-1, 3)
+
+
+def _filled(shell: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """The shell and all voxels that it walls in."""
+    walls = np.zeros(shell.shape, dtype=np.int8)
+    for axis in range(3):
+        walls += np.logical_or.accumulate(shell, axis=axis)
+        walls += np.flip(np.logical_or.accumulate(np.flip(shell, axis), axis=axis), axis)
+    return shell | (walls >= _WALLS)
