@@ -109,7 +109,10 @@ class Director:
     def direct(self, frame: SkeletonFrame) -> None:
         """While matching, show the best match of the newest pose; accept it in time."""
         pose = self._performer.pose
-        if not self.matching or pose is None or not self.sees(frame):
+        if not self.matching or pose is None:
+            return
+        if not self.sees(frame):
+            self._since = float("nan")  # who comes back strikes a pose anew
             return
         changed = False
         for number, puppet in enumerate(self._puppets):

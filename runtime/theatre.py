@@ -62,6 +62,7 @@ class Theatre:
         self._inset = None if plain or transparent else SkeletonInset(performer.parents)
         self.highlights = not (plain or transparent)
         self.camera = front_camera()
+        self._filled: NDArray[np.float64] | None = None
         self.frame_all()
 
     def frame_all(self, filled: NDArray[np.float64] | None = None) -> None:
@@ -69,9 +70,10 @@ class Theatre:
 
         Args:
             filled: (A, 2, 3) [m] what each puppet is known to fill in the show, in its own
-                coordinates; a guess from the rest poses when None.
+                coordinates; when None what was known before, else a guess from the rest poses.
         """
         boxes = self.stage.boxes
+        self._filled = filled = self._filled if filled is None else filled
         if filled is None:
             room = ROOM * np.ptp(boxes, axis=1).max(axis=1)[:, None]
             boxes[:, 0, ::2] -= room

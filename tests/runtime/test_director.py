@@ -110,6 +110,15 @@ def test_a_match_performs_when_it_has_stood_for_as_long_as_asked(puppet: Puppet)
     assert show.director.matching, "the waiting begins anew with another match"
 
 
+def test_who_comes_back_into_view_has_to_stand_anew(puppet: Puppet) -> None:
+    show = Rehearsal(puppet, Choices(patience=0.45))
+    show.strike(pose(T_POSE))
+    for _ in range(10):
+        show.strike(np.full_like(pose(T_POSE), np.nan))
+    show.strike(pose(T_POSE))
+    assert show.director.matching
+
+
 def test_too_little_of_the_performer_strikes_no_pose(puppet: Puppet) -> None:
     show = Rehearsal(puppet, Choices(), source="arms")
     joints = show.performer.joints
