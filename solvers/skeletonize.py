@@ -25,7 +25,7 @@ from scipy.spatial import cKDTree
 
 from solvers.abstraction import find_root
 from solvers.tree import Tree
-from solvers.voxel_solid import closed_surface, surface_samples
+from solvers.voxel_solid import surface_samples, voxel_solid
 
 VERSION = 2
 """Changes whenever the same surface would give another skeleton; part of the key of a cache."""
@@ -35,14 +35,16 @@ MOST_NODES = 200
 # Lengths are shares of the longest side of the surface's box, radii those of the largest ball
 # around a node that stays inside the surface.
 _GRAPH_VERTICES = 1200  # separators cost more than linear time
+_MOST_ENDS = 66  # so that every limb gets its bones within MOST_NODES
 _MOST_PIECES = 64
 _SAME = 1e-5  # vertices closer than this are one
 _FEWEST = 24  # with fewer vertices there are no rings around limbs
 _FLAT = 1e-3  # a surface thinner than this is a sheet
 _OPENINGS = 2  # more, and together longer than _OPEN times the root of the area, and there is
 _OPEN = 1.5  # no clear inside
-_SPACING = 1 / 64  # of the samples that tell how far the surface is
-_SPUR = 2.0  # a limb is at least so many times as long as its largest radius, to its tip
+_SPACING = 1 / 64  # of the samples on the border of a sheet
+_SPUR = 1.8  # a limb is at least so many times as long as its largest radius, to its tip
+_PROBES = 8  # bones along which that radius is looked for
 _SHORTEST = 0.04  # and at least this
 _CONE = 0.5  # cosine of the angle in which a tip lies ahead of a leaf
 _TIP = 0.9  # the share of what surrounds a leaf that lies before its tip
@@ -70,6 +72,10 @@ class _Graph:
             lists[a].append(b)
             lists[b].append(a)
         return lists
+
+    def ends(self) -> list[int]:
+        """Nodes at which chains end: forks and tips."""
+        return [node for node, near in enumerate(self.neighbours()) if len(near) != 2]
 
 
 def extract_skeleton(vertices: FloatArray, faces: IntArray) -> tuple[IntArray, FloatArray]:
@@ -135,14 +141,22 @@ def _limbs(points: FloatArray, triangles: IntArray) -> _Graph | None:
         return None
     border = _borders(triangles)
     flat = np.ptp(points @ _axes(points)[2]) < _FLAT
-    if not flat and not _has_inside(points, triangles, border):
-        points, triangles = closed_surface(points, triangles)
-    outline = np.column_stack([border, border[:, 0]]) if flat and len(border) else triangles
-    outside = cKDTree(surface_samples(points, outline, _SPACING))
+    if flat and len(border):
+        outside = cKDTree(
+            surface_samples(points, np.column_stack([border, border[:, 0]]), _SPACING)
+        )
+    else:
+        solid = voxel_solid(points, triangles)
+        outside = cKDTree(solid.outermost)
+        if not flat and not _has_inside(points, triangles, border):
+            points, triangles = solid.closed_surface()
     surface = _surface_graph(*_reduced(points, triangles))
     tree = _opened(*_local_separators(surface), outside)
-    tree = _pruned(tree, surface, outside)
-    tree = _pruned(_forks_merged(tree, outside), surface, outside)
+    tree = _pruned(tree, surface, outside, _SHORTEST)
+    tree = _forks_merged(tree, outside)
+    shortest = _SHORTEST
+    while len((tree := _pruned(tree, surface, outside, shortest)).ends()) > _MOST_ENDS:
+        shortest *= 1.5
     if len(tree.positions) < 2:
         return None
     tree = _resampled(_smoothed(_with_tips(tree, surface)))
@@ -338,10 +352,11 @@ def _with_tips(tree: _Graph, surface: _Graph) -> _Graph:
 
 def _chains(neighbours: list[list[int]]) -> list[Chain]:
     """Maximal runs of nodes between forks and tips, each once; both ends are in the run."""
-    ends = [node for node, near in enumerate(neighbours) if len(near) != 2]
     chains = []
-    for start in ends:
-        for first in neighbours[start]:
+    for start, around in enumerate(neighbours):
+        if len(around) == 2:
+            continue
+        for first in around:
             chain = [start, first]
             while len(neighbours[chain[-1]]) == 2:
                 a, b = neighbours[chain[-1]]
@@ -355,30 +370,21 @@ def _length(positions: FloatArray, chain: Chain) -> float:
     return float(np.linalg.norm(np.diff(positions[chain], axis=0), axis=1).sum())
 
 
-def _pruned(tree: _Graph, surface: _Graph, outside: cKDTree) -> _Graph:
+def _pruned(tree: _Graph, surface: _Graph, outside: cKDTree, shortest: float) -> _Graph:
     """Without spurs: limbs that, led on to their tips, are hardly longer than thick.
 
     All spurs of a fork go at once, so that a head does not end in the longer one of its ears.
     """
     while True:
         whole = _with_tips(tree, surface)
-        radii = _thickness(tree, outside)
         spurs: set[int] = set()
         for run in _tip_chains(tree.neighbours()):
-            if _length(whole.positions, run) < max(_SPUR * radii[run].max(), _SHORTEST):
+            radii = outside.query(_evenly(whole.positions[run], _PROBES))[0]
+            if _length(whole.positions, run) < max(_SPUR * radii.max(), shortest):
                 spurs.update(run[1:])
         if not spurs:
             return tree
         tree = _without(tree, sorted(spurs))
-
-
-def _thickness(tree: _Graph, outside: cKDTree) -> FloatArray:
-    """Radius (n,) of the largest ball inside the surface around each node or one beside it."""
-    radii = np.asarray(outside.query(tree.positions)[0], dtype=np.float64)
-    thickness = radii.copy()
-    for one, other in (tree.edges.T, tree.edges.T[::-1]):
-        np.maximum.at(thickness, one, radii[other])
-    return thickness
 
 
 def _tip_chains(neighbours: list[list[int]]) -> list[Chain]:
@@ -436,7 +442,7 @@ def _resampled(tree: _Graph) -> _Graph:
     """With bones of similar length: 3 to 12 from a fork to a tip, 1 to 12 between two forks."""
     neighbours = tree.neighbours()
     chains = _chains(neighbours)
-    forks = [node for node, near in enumerate(neighbours) if len(near) != 2]
+    forks = tree.ends()
     renumber = {node: index for index, node in enumerate(forks)}
     positions = list(tree.positions[forks])
     total = sum(_length(tree.positions, chain) for chain in chains)
