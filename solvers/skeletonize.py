@@ -27,7 +27,7 @@ from solvers.abstraction import find_root
 from solvers.tree import Tree
 from solvers.voxel_solid import surface_samples, voxel_solid
 
-VERSION = 2
+VERSION = 3
 """Changes whenever the same surface would give another skeleton; part of the key of a cache."""
 
 MOST_NODES = 200
