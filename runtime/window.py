@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import glfw
@@ -33,20 +31,13 @@ class KeyPressed:
 
 
 @dataclass(frozen=True, slots=True)
-class FilesDropped:
-    """Files were dragged onto the window."""
-
-    paths: tuple[Path, ...]
-
-
-@dataclass(frozen=True, slots=True)
 class Resized:
     """The window's framebuffer has another size [px]."""
 
     size: tuple[int, int]
 
 
-Event = KeyPressed | FilesDropped | Resized
+Event = KeyPressed | Resized
 
 KEY_NAMES = {
     glfw.KEY_SPACE: "space",
@@ -73,8 +64,7 @@ class Window:
     Attributes:
         camera: what the mouse moves; set it to frame something else.
         context: the window's GL context.
-        handle: glfw's window, for a panel that draws over the picture.
-        mouse_taken, keys_taken: set while such a panel uses the mouse or the keyboard.
+        handle: glfw's window; None once it is closed.
 
     Raises:
         InputError: there is no display, or no OpenGL 3.3 on it.
@@ -88,8 +78,6 @@ class Window:
             glfw.destroy_window(self.handle)
             raise
         self.camera: Camera = front_camera()
-        self.mouse_taken = False
-        self.keys_taken = False
         self._events: list[Event] = []
         self._cursor = glfw.get_cursor_pos(self.handle)
         self._dragging: int | None = None
@@ -98,8 +86,6 @@ class Window:
         glfw.set_mouse_button_callback(self.handle, self._on_button)
         glfw.set_cursor_pos_callback(self.handle, self._on_cursor)
         glfw.set_scroll_callback(self.handle, self._on_scroll)
-        on_drop: Any = self._on_drop  # glfw annotates the bare C callback
-        glfw.set_drop_callback(self.handle, on_drop)
         glfw.set_framebuffer_size_callback(self.handle, self._on_resize)
 
     @property
@@ -128,10 +114,6 @@ class Window:
         """Show what was drawn into the framebuffer."""
         glfw.swap_buffers(self.handle)
 
-    def set_title(self, title: str) -> None:
-        """Write another title on the window."""
-        glfw.set_window_title(self.handle, title)
-
     def close(self) -> None:
         """Close the window; its context ends with it."""
         if self.handle is not None:
@@ -141,16 +123,11 @@ class Window:
     def __enter__(self) -> Window:
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, *exc: object) -> None:
         self.close()
 
     def _on_key(self, _: object, key: int, scancode: int, action: int, mods: int) -> None:
-        if action == glfw.RELEASE or self.keys_taken:
+        if action == glfw.RELEASE:
             return
         name = KEY_NAMES.get(key) or glfw.get_key_name(key, scancode)
         if name:
@@ -160,7 +137,7 @@ class Window:
     def _on_button(self, _: object, button: int, action: int, mods: int) -> None:
         if action == glfw.RELEASE:
             self._dragging = None
-        elif not self.mouse_taken:
+        else:
             shifted = button == glfw.MOUSE_BUTTON_LEFT and mods & glfw.MOD_SHIFT
             self._dragging = glfw.MOUSE_BUTTON_MIDDLE if shifted else button
 
@@ -176,11 +153,7 @@ class Window:
             self.camera = self.camera.pan(-right / height, down / height)
 
     def _on_scroll(self, _: object, right: float, up: float) -> None:
-        if not self.mouse_taken:
-            self.camera = self.camera.zoom(ZOOM_STEP**up)
-
-    def _on_drop(self, _: object, paths: list[str]) -> None:
-        self._events.append(FilesDropped(tuple(Path(path) for path in paths)))
+        self.camera = self.camera.zoom(ZOOM_STEP**up)
 
     def _on_resize(self, _: object, width: int, height: int) -> None:
         self._events.append(Resized((max(width, 1), max(height, 1))))

@@ -9,8 +9,6 @@ from numpy.typing import NDArray
 
 from runtime.render.camera import Camera, box_corners
 
-Box = NDArray[np.float64]  # (2, 3) least and greatest corner [m]
-
 MAX_POOLS = 16
 KEY_DIRECTION = np.array([-0.66, 0.90, 0.52]) / np.linalg.norm([-0.66, 0.90, 0.52])
 

@@ -21,7 +21,7 @@ from runtime.puppet import Puppet
 from runtime.render.camera import Camera, front_camera
 from runtime.render.context import headless_context, release_headless
 from runtime.theatre import Theatre
-from runtime.window import Event, FilesDropped, KeyPressed, Resized
+from runtime.window import Event, KeyPressed, Resized
 from tests.runtime.figures import BODY, FRONT_VIEW, T_POSE, frame, make_figure, pose, record, waving
 
 SIZE = (64, 36)
@@ -215,8 +215,7 @@ def test_what_is_shown_is_the_newest_picture(show: Show) -> None:
     )
 
 
-def test_other_keys_and_files_change_nothing(show: Show, tmp_path) -> None:
-    show.desk.events.append(FilesDropped((tmp_path,)))
+def test_other_keys_change_nothing(show: Show) -> None:
     show.press("q", "f5", "tab", "é")
     assert not show.controls.leaving
     assert show.director.matching

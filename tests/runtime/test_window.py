@@ -17,7 +17,7 @@ from devices.errors import InputError
 from runtime.render.camera import front_camera
 from runtime.render.context import headless_context, release_headless
 from runtime.render.stage import Stage
-from runtime.window import FilesDropped, KeyPressed, Resized, Window
+from runtime.window import KeyPressed, Resized, Window
 
 
 @pytest.fixture
@@ -44,21 +44,19 @@ def test_the_window_shows_the_picture_that_is_read(window: Window) -> None:
     stage.release()
 
 
-def test_keys_drops_and_resizing_become_events(window: Window) -> None:
+def test_keys_and_resizing_become_events(window: Window) -> None:
     window.poll()
     window._on_key(None, glfw.KEY_SPACE, 0, glfw.PRESS, glfw.MOD_SHIFT)
     window._on_key(None, glfw.KEY_SPACE, 0, glfw.RELEASE, 0)
-    window._on_drop(None, ["a.obj"])
     window._on_resize(None, 200, 100)
     assert window.poll() == [
         KeyPressed("space", shift=True),
-        FilesDropped((Path("a.obj"),)),
         Resized((200, 100)),
     ]
     assert window.poll() == []
 
 
-def test_the_mouse_orbits_pans_and_zooms_unless_a_panel_has_it(window: Window) -> None:
+def test_the_mouse_orbits_pans_and_zooms(window: Window) -> None:
     window.poll()
     window._cursor = (100.0, 100.0)
     start = window.camera
@@ -76,10 +74,6 @@ def test_the_mouse_orbits_pans_and_zooms_unless_a_panel_has_it(window: Window) -
     window._on_button(None, glfw.MOUSE_BUTTON_RIGHT, glfw.RELEASE, 0)
     window._on_scroll(None, 0.0, 1.0)
     assert window.camera.distance < turned.distance
-    window.mouse_taken = True
-    near = window.camera
-    window._on_scroll(None, 0.0, 1.0)
-    assert window.camera == near
 
 
 def test_without_a_display_one_line_says_to_go_headless() -> None:
