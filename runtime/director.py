@@ -20,11 +20,12 @@ from runtime.puppet import STRAIGHT_ON, Body, Puppet, body_of
 from solvers.abstraction import simplify
 from solvers.match_hysteresis import MatchHysteresis
 from solvers.matching import SIZE_PREFERENCE, Match, TargetHierarchy
-from solvers.posture import likeness
+from solvers.posture import likeness, most_different
 
 LEAST_SEEN = 0.5  # share of the driving joints that must be in view to strike a pose
 CANDIDATES = 20  # matches that can be cycled through
-EVERY = 2  # of the poses of a rehearsal are gone through; the rest state is chosen from all
+CHOICES = 32  # poses of a rehearsal, evenly, that the rest state is chosen from
+TRIED = 16  # poses of a rehearsal that are gone through: those that differ most
 
 Array = NDArray[np.float64]
 View = Callable[[], Array]
@@ -93,7 +94,8 @@ class Director:
             (A, 2, 3) [m] for each puppet the corners of all that it fills in those poses.
         """
         view = self._view()
-        states = [rest_state(pose, heading=0.0) for pose in poses]
+        evenly = np.unique(np.linspace(0, len(poses) - 1, CHOICES).round().astype(int))
+        states = [rest_state(poses[index], heading=0.0) for index in evenly]
         for number, puppet in enumerate(self._puppets):
             choices = []
             for state in states:  # each by itself: no pose waits for the one before
@@ -104,7 +106,9 @@ class Director:
             mapping, rest, self._shown[number] = choices[int(np.argmax(worths))]
             puppet.take(mapping, rest, view, self._body(puppet, mapping, rest))
         self.matching = False
-        return np.array([puppet.rehearse(poses[::EVERY]) for puppet in self._puppets])
+        facing = np.array([pose.facing(0.0) - pose.hips for pose in poses])
+        tried = [poses[index] for index in most_different(facing, TRIED)]
+        return np.array([puppet.rehearse(tried) for puppet in self._puppets])
 
     def direct(self, frame: SkeletonFrame) -> None:
         """While matching, show the best match of the newest pose; accept it in time."""

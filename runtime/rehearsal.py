@@ -11,7 +11,7 @@ from runtime.performer import Performer
 
 Array = NDArray[np.float64]
 
-POSES = 32  # looked at, evenly through the recording
+POSES = 500  # looked at, evenly through the recording
 
 
 def rehearse(recording: Recording, source: str, director: Director) -> Array | None:

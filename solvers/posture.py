@@ -1,4 +1,4 @@
-"""How alike two polylines look on the screen, bone by bone, whatever their size and sampling.
+"""How alike polylines look on the screen, bone by bone; and which poses of many differ most.
 
 The score of AniMesh section 4.2 compares where branches lead as a whole; a bent arm and a straight
 one score the same. Where one of many poses is to become the rest state, from which the target's
@@ -27,6 +27,25 @@ def likeness(source: Array, target: Array, source_view: Array, target_view: Arra
     ours = _directions(source @ source_view.T)
     theirs = _directions(target @ target_view.T)
     return float((ours * theirs).sum(axis=1).mean())
+
+
+def most_different(poses: Array, wanted: int) -> NDArray[np.int64]:
+    """Indices, rising, of poses far from each other: the extremes of a motion come first.
+
+    Args:
+        poses: (T, n, 3) points of each pose, T >= 1.
+        wanted: how many, at most.
+
+    Source: Gonzalez 1985, farthest-first traversal.
+    """
+    flat = poses.reshape(len(poses), -1)
+    gap = np.linalg.norm(flat - flat.mean(axis=0), axis=1)
+    chosen = [int(np.argmax(gap))]
+    gap = np.linalg.norm(flat - flat[chosen[0]], axis=1)
+    while len(chosen) < wanted and gap.max() > 0.0:
+        chosen.append(int(np.argmax(gap)))
+        gap = np.minimum(gap, np.linalg.norm(flat - flat[chosen[-1]], axis=1))
+    return np.array(sorted(chosen), dtype=np.int64)
 
 
 def _directions(points: Array) -> Array:

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from solvers.posture import likeness
+from solvers.posture import likeness, most_different
 
 FRONT = np.eye(3)
 BENT = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]])
@@ -37,3 +37,15 @@ def test_size_place_and_sampling_do_not_matter(size: float, parts: int) -> None:
     )
     moved = size * finer + [3.0, -2.0, 5.0]
     assert likeness(moved, BENT, FRONT, FRONT) == pytest.approx(1.0)
+
+
+def test_the_extremes_of_a_swing_are_among_the_poses_that_differ_most() -> None:
+    angles = np.concatenate([np.linspace(0.0, 0.2, 50), [2.0], np.linspace(0.2, 0.0, 50), [-2.0]])
+    poses = np.stack([np.cos(angles), np.sin(angles), np.zeros_like(angles)], axis=1)[:, None]
+    chosen = most_different(poses, 3)
+    assert chosen.tolist() == sorted(chosen.tolist())
+    assert {50, 101} <= set(chosen.tolist())
+
+
+def test_equal_poses_are_taken_once() -> None:
+    assert len(most_different(np.ones((9, 4, 3)), 5)) == 1
