@@ -4,7 +4,7 @@ Three kinds of file hold the same messages: one JSON object a line (a header wit
 version first), one JSON document with a list of frames (LeapJS Playback, also its packed form, in
 which the first frame is the scheme of the others), and that document compressed by lz-string.
 Protocol 6 gives every finger's bones and says which hand is which; protocols before it give palms
-and finger tips only (`replay.leap_tips` then finds out which is which).
+and finger tips only (`devices.leap_tips` then finds out which is which).
 
 Millimetres in device axes become metres as `devices.leap_joints` says. A frame without a hand is
 kept, at the ends of a recording too, with every joint NaN and confidence 0.
@@ -13,9 +13,7 @@ kept, at the ends of a recording too, with every joint NaN and confidence 0.
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -24,9 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.errors import InputError
+from devices.leap_hands import Hand, LeapFrame, leap_frame
 from devices.leap_joints import (
-    FINGERS,
-    HAND_PARENTS,
     PALM,
     ROOT,
     SIDES,
@@ -34,8 +31,8 @@ from devices.leap_joints import (
     hand_skeleton,
     leap_to_world,
 )
+from devices.leap_tips import name_tips
 from devices.skeleton import Skeleton
-from replay.leap_tips import Tip, name_tips
 from replay.lz_string import lz_pieces
 from replay.recording import Recording
 
@@ -44,33 +41,10 @@ Array = NDArray[np.float64]
 MAX_BYTES = 128 << 20  # of a JSON document, decompressed
 MAX_LINE = 4 << 20
 MAX_FRAMES = 1_000_000
-FARTHEST_MM = 1e5
 USUAL_RATE = 110.0  # frames/s, where nothing in the file says
 
 _MARKS = (b'"pointables"', b'"interactionBox"', b'"palmPosition"', b'"LeapJS')
 _LZ_BEGINNINGS = ('{"frames"', '{"metadata"')
-
-
-@dataclass(slots=True)
-class Hand:
-    """One hand of one message: positions [mm, device axes] by joint name, and its finger tips."""
-
-    id: int
-    side: str | None
-    confidence: float
-    joints: dict[str, Array]
-    direction: Array
-    normal: Array
-    tips: list[Tip] = field(default_factory=list)
-
-
-@dataclass(slots=True)
-class LeapFrame:
-    """One message: the device's time [us] or None, the rate it states, and its hands."""
-
-    timestamp: float | None
-    rate: float | None
-    hands: list[Hand]
 
 
 def recognises_leap(path: Path, head: bytes) -> bool:
@@ -89,7 +63,7 @@ def read_leap(path: Path) -> Recording:
     """
     notes: list[str] = []
     try:
-        frames = [_frame(message) for message in _messages(path, notes)]
+        frames = [leap_frame(message) for message in _messages(path, notes)]
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror or error}") from error
     except (ValueError, TypeError, KeyError, RecursionError) as error:
@@ -208,79 +182,6 @@ def _unpack(scheme: Any, values: Any) -> dict[str, Any]:
         else:
             found[name] = _unpack(inner, value)
     return found
-
-
-# -- one frame ------------------------------------------------------------------------------------
-
-
-def _frame(message: dict[str, Any]) -> LeapFrame:
-    hands = {hand.id: hand for hand in map(_hand, _objects(message.get("hands")))}
-    for pointable in _objects(message.get("pointables")):
-        hand = hands.get(_whole(pointable.get("handId")))
-        if hand is not None and pointable.get("tool") is not True:
-            _add_finger(hand, pointable)
-    return LeapFrame(
-        timestamp=_number(message.get("timestamp")),
-        rate=_number(message.get("currentFrameRate")),
-        hands=[hand for hand in hands.values() if PALM in hand.joints],
-    )
-
-
-def _hand(found: dict[str, Any]) -> Hand:
-    places = {"elbow": "elbow", "wrist": "wrist", PALM: "palmPosition"}
-    confidence = _number(found.get("confidence"))
-    side = found.get("type")
-    return Hand(
-        id=_whole(found.get("id")),
-        side=side if side in SIDES else None,
-        confidence=1.0 if confidence is None else min(max(confidence, 0.0), 1.0),
-        joints=_seen({name: found.get(key) for name, key in places.items()}),
-        direction=_vector(found.get("direction")),
-        normal=_vector(found.get("palmNormal")),
-    )
-
-
-def _add_finger(hand: Hand, pointable: dict[str, Any]) -> None:
-    tip = _vector(pointable.get("tipPosition"))
-    if "mcpPosition" not in pointable:
-        if np.isfinite(tip).all():
-            hand.tips.append(Tip(_whole(pointable.get("id")), tip))
-        return
-    kind = _whole(pointable.get("type"))
-    if kind < 0:  # the packed form leaves it out; ids are 10 * hand + finger
-        kind = _whole(pointable.get("id")) % 10
-    if kind < len(FINGERS):
-        finger = f"{FINGERS[kind]}_"
-        ends = [name for name in HAND_PARENTS if name.startswith(finger)]
-        places = {end: pointable.get(f"{end.removeprefix(finger)}Position") for end in ends}
-        hand.joints.update(_seen(places))
-
-
-def _objects(found: Any) -> list[dict[str, Any]]:
-    return [item for item in found if isinstance(item, dict)] if isinstance(found, list) else []
-
-
-def _seen(vectors: dict[str, Any]) -> dict[str, Array]:
-    found = {name: _vector(value) for name, value in vectors.items()}
-    return {name: vector for name, vector in found.items() if np.isfinite(vector).all()}
-
-
-def _vector(value: Any) -> Array:
-    numbers = [_number(item) for item in value] if isinstance(value, list) else []
-    if len(numbers) != 3 or any(n is None or abs(n) > FARTHEST_MM for n in numbers):
-        return np.full(3, np.nan)
-    return np.array(numbers, dtype=np.float64)
-
-
-def _number(value: Any) -> float | None:
-    if not isinstance(value, int | float) or isinstance(value, bool):
-        return None
-    number = float(value) if abs(value) < 1e300 else math.inf
-    return number if math.isfinite(number) else None
-
-
-def _whole(value: Any) -> int:
-    return value if isinstance(value, int) else -1
 
 
 # -- from frames to a recording -------------------------------------------------------------------
