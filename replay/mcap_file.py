@@ -4,17 +4,20 @@ Layout, so that any MCAP tool (Foxglove, the `mcap` command) can read it:
 
 - metadata record ``bunraku.skeleton`` with the key ``json``, written first, outside any chunk: the
   joint names, parents and rest positions; the same JSON is the first message, on ``/skeleton``;
+- metadata record ``bunraku.source``: where the frames came from and when, as short texts;
 - one channel ``/performer/<id>`` a performer; each message is one frame as JSON (schema
   ``bunraku.SkeletonFrame``); `log_time` is when it came in, `publish_time` the performer's own
   time, both in nanoseconds; the message repeats both as the float seconds that they were, and a
-  number is written with all its digits, so that a recording reads back bit for bit;
+  number is written with all its digits, so that a recording reads back bit for bit; `sequence`
+  numbers the frames as they came, and leaves out those that the disk was too slow for;
 - what was not seen is ``null``.
 """
 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from itertools import islice
 from pathlib import Path
 from typing import Any, Self
 
@@ -37,9 +40,11 @@ from replay.mcap_records import (
 from replay.recording import Recording
 
 SKELETON_NAME = "bunraku.skeleton"
+SOURCE_NAME = "bunraku.source"
 SKELETON_TOPIC = "/skeleton"
 PERFORMER_TOPIC = "/performer/"
 FARTHEST_REST = 1000.0  # [m]
+MOST_SOURCE_FACTS = 64
 
 _NUMBER = {"type": ["number", "null"]}
 _ROWS = {"type": "array", "items": {"type": "array", "items": _NUMBER}}
@@ -166,6 +171,8 @@ class McapReader:
 
     Attributes:
         skeleton: the skeleton of every frame.
+        source: what the file says of where its frames come from.
+        missing: frames that came, by their numbers, but were not found so far.
         faults: what could not be read so far; the frames around it are given all the same.
 
     Raises:
@@ -175,6 +182,8 @@ class McapReader:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.faults: list[Fault] = []
+        self.source: dict[str, str] = {}
+        self.missing = 0
         try:
             self._file = path.open("rb")
         except OSError as error:
@@ -200,6 +209,7 @@ class McapReader:
         topics: dict[int, str] = {}
         joints = len(self.skeleton.names)
         earliest = since * 1e9
+        self.missing, expected = 0, None
         for offset, record in self._records(earliest):
             if isinstance(record, Channel):
                 topics[record.id] = record.topic
@@ -207,6 +217,9 @@ class McapReader:
                 # The chunk that named the channel may be damaged or passed over: then try.
                 if not topics.get(record.channel_id, PERFORMER_TOPIC).startswith(PERFORMER_TOPIC):
                     continue
+                if expected is not None and record.sequence > expected:
+                    self.missing += record.sequence - expected
+                expected = record.sequence + 1
                 try:
                     yield decode_frame(record.data, joints)
                 except DamagedRecordError as error:
@@ -225,6 +238,8 @@ class McapReader:
     def _find_skeleton(self) -> Skeleton:
         topics: dict[int, str] = {}
         for _, record in self._records(float("-inf")):
+            if isinstance(record, Metadata) and record.name == SOURCE_NAME:
+                self.source = dict(islice(record.metadata.items(), MOST_SOURCE_FACTS))
             if isinstance(record, Metadata) and record.name == SKELETON_NAME:
                 return self._skeleton(record.metadata.get("json", ""))
             if isinstance(record, Channel):
@@ -290,14 +305,17 @@ def read_mcap(path: Path) -> Recording:
     with McapReader(path) as reader:
         frames = list(reader.frames())
         notes = _notes(reader, len(frames))
-        skeleton = reader.skeleton
+        skeleton, source = reader.skeleton, reader.source
     if not frames:
         raise InputError(f"{path} holds a skeleton but no whole frame")
-    return stack_frames(skeleton, frames, notes)
+    return stack_frames(skeleton, frames, notes, source)
 
 
 def stack_frames(
-    skeleton: Skeleton, frames: list[SkeletonFrame], notes: tuple[str, ...] = ()
+    skeleton: Skeleton,
+    frames: list[SkeletonFrame],
+    notes: tuple[str, ...] = (),
+    source: Mapping[str, str] | None = None,
 ) -> Recording:
     """A recording of `frames` (one or more), in order of time, which is counted from the first."""
     times = np.array([frame.time for frame in frames])
@@ -318,6 +336,7 @@ def stack_frames(
         performers=np.array([frames[i].performer for i in order], dtype=np.int64),
         arrivals=np.array([frames[i].arrival for i in order]) - start,
         notes=notes,
+        source=dict(source or {}),
     )
 
 
@@ -325,6 +344,11 @@ def _notes(reader: McapReader, count: int) -> tuple[str, ...]:
     notes = tuple(f"at byte {fault.offset}: {fault.reason}" for fault in reader.faults[:8])
     if len(reader.faults) > 8:
         notes += (f"and {len(reader.faults) - 8} faults more",)
+    if reader.missing:
+        notes += (
+            f"{reader.missing} frames came but are not in the file: the disk was too slow, "
+            "or that part of it is damaged",
+        )
     if not reader.indexed:
         notes += (f"the recording was never finished; {count} whole frames were recovered",)
     return notes

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,6 +26,7 @@ class Recording:
         performers: (T,) int, whose frame each is.
         arrivals: (T,) [s] when each came in; NaN where the file does not say.
         notes: what the reader guessed or mended, one short line each, for `bunraku info`.
+        source: where the frames came from, as far as the file says: short texts by name.
 
     Raises:
         InputError: no frame at all.
@@ -38,6 +40,7 @@ class Recording:
     performers: NDArray[np.int64]
     arrivals: NDArray[np.float64]
     notes: tuple[str, ...] = ()
+    source: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         frames, joints = len(self.times), len(self.skeleton.names)
@@ -74,4 +77,26 @@ class Recording:
             confidence=self.confidence[index],
             performer=int(self.performers[index]),
             arrival=float(self.arrivals[index]),
+        )
+
+    def of(self, performer: int) -> Recording:
+        """The frames of one performer alone; times stay as they are.
+
+        Raises:
+            InputError: nobody in it has that number; the message lists who has.
+        """
+        own = self.performers == performer
+        if not own.any():
+            there = ", ".join(str(number) for number in np.unique(self.performers))
+            raise InputError(
+                f"there is no performer {performer} in the recording; there are: {there}"
+            )
+        return replace(
+            self,
+            times=self.times[own],
+            positions=self.positions[own],
+            rotations=None if self.rotations is None else self.rotations[own],
+            confidence=self.confidence[own],
+            performers=self.performers[own],
+            arrivals=self.arrivals[own],
         )

@@ -1,0 +1,153 @@
+"""The recorder of a running show: takes every frame at once, writes from a thread of its own."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Self
+
+from devices.errors import InputError
+from devices.skeleton import Skeleton, SkeletonFrame
+from replay.mcap_writer import SYNC_SECONDS, McapWriter
+
+WAITING = 16_384
+"""Frames that wait for the disk at most, about 80 MB of 59 joints: a minute of four performers at
+60 Hz while the disk stands still."""
+
+
+class Recorder:
+    """Records frames to an MCAP file; no fault of the disk ever reaches who hands them over.
+
+    Frames wait in a queue of bounded length that a thread empties, whatever the frame loop does.
+    When the disk fails the file is kept up to there, `tell` gets one line at once, and what comes
+    after is counted. The numbers of lost frames are left out of the file's sequence, so that a
+    reader sees where they are missing.
+
+    Args:
+        path: is replaced.
+        skeleton: of every frame.
+        source: see `McapWriter`.
+        tell: takes one line on what is wrong, from any thread, and must not raise.
+        waiting: frames that may wait for the disk.
+
+    Raises:
+        InputError: the file cannot be made.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        skeleton: Skeleton,
+        *,
+        source: Mapping[str, str] | None = None,
+        tell: Callable[[str], None],
+        waiting: int = WAITING,
+    ) -> None:
+        self.path = path
+        self._writer = McapWriter(path, skeleton, source=source)
+        self._tell = tell
+        self._queue: queue.Queue[tuple[int, SkeletonFrame] | None] = queue.Queue(waiting)
+        self._lock = threading.Lock()
+        self._offered = self._overrun = self._unwritten = 0
+        self._fault = ""
+        self._moved = self._closed = False
+        self._thread = threading.Thread(target=self._run, name="recorder", daemon=True)
+        self._thread.start()
+
+    @property
+    def frames(self) -> int:
+        """Frames that are in the file."""
+        return self._writer.safe if self._fault else self._writer.frames
+
+    @property
+    def lost(self) -> int:
+        """Frames that came and are not in the file: the disk was too slow, or failed."""
+        return self._overrun + self._unwritten + self._writer.frames - self.frames
+
+    @property
+    def fault(self) -> str:
+        """Why the recording stopped before its end; empty while all is well."""
+        return self._fault
+
+    def offer(self, frame: SkeletonFrame) -> None:
+        """Keep a frame without ever waiting; one that finds the queue full is lost and counted."""
+        with self._lock:
+            if self._closed:
+                return
+            number, self._offered = self._offered, self._offered + 1
+            try:
+                self._queue.put_nowait((number, frame))
+            except queue.Full:
+                self._overrun += 1
+                if self._overrun == 1:
+                    self._tell(
+                        f"the disk is too slow for {self.path}: frames are missing in the recording"
+                    )
+
+    def write(self, frame: SkeletonFrame) -> None:
+        """Keep a frame, waiting for room: for a source that itself waits, such as a recording."""
+        with self._lock:
+            if self._closed:
+                return
+            number, self._offered = self._offered, self._offered + 1
+        self._queue.put((number, frame))
+
+    def close(self) -> None:
+        """Write what waits and finish the file; tells faults, raises none. May be called twice."""
+        with self._lock:
+            closed, self._closed = self._closed, True
+        if closed:
+            return
+        self._queue.put(None)
+        self._thread.join()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
+
+    def _run(self) -> None:
+        while (entry := self._next()) is not None:
+            if self._fault:
+                self._unwritten += 1
+            else:
+                self._keep(*entry)
+        try:
+            self._writer.close()
+        except InputError as error:
+            self._fail(error)
+
+    def _next(self) -> tuple[int, SkeletonFrame] | None:
+        """The next frame, None at the end; while none comes, what has come goes to the disk."""
+        while True:
+            try:
+                return self._queue.get(timeout=SYNC_SECONDS)
+            except queue.Empty:
+                if not self._fault:
+                    self._attempt(self._writer.sync)
+
+    def _keep(self, number: int, frame: SkeletonFrame) -> None:
+        if not self._attempt(lambda: self._writer.write(frame, number)):
+            self._unwritten += 1
+
+    def _attempt(self, write: Callable[[], None]) -> bool:
+        try:
+            write()
+        except InputError as error:
+            self._fail(error)
+            return False
+        except ValueError:  # a frame that no file could hold; the next one may be whole
+            return False
+        if self._writer.moved and not self._moved:
+            self._moved = True
+            self._tell(f"{self.path} was moved; the recording goes on in it, wherever it is now")
+        return True
+
+    def _fail(self, error: InputError) -> None:
+        if not self._fault:
+            self._fault = str(error)
+            kept = f"its first {self.frames} frames are kept" if self.path.exists() else ""
+            self._tell(f"{error}; recording has stopped" + (kept and f", {kept}"))
