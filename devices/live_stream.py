@@ -64,6 +64,7 @@ class LiveStream:
         self.transport = transport
         self._senders = Senders(make_decoder)
         self._inbox = Inbox(capacity)
+        self._listeners: tuple[Callable[[SkeletonFrame], None], ...] = ()
         self._rhythm = Rhythm()
         self._packets = self._frames = self._failed = 0
         self._last_seen = float("nan")
@@ -96,6 +97,14 @@ class LiveStream:
             last_seen=self._last_seen,
             trouble=self._trouble or self.transport.trouble,
         )
+
+    def tap(self, listener: Callable[[SkeletonFrame], None]) -> None:
+        """Show every frame from now on to `listener`, in order, as it comes, on the reader thread.
+
+        A recorder listens here: before the inbox, which drops what the loop is too slow for. The
+        listener must neither wait nor raise.
+        """
+        self._listeners = (*self._listeners, listener)
 
     def poll(self) -> Sequence[SkeletonFrame]:
         """Every frame that has come since the last poll, oldest first; never blocks."""
@@ -133,5 +142,7 @@ class LiveStream:
             return
         for frame in frames:
             self._rhythm.note(frame.arrival, frame.performer)
+            for listener in self._listeners:
+                listener(frame)
         self._frames += len(frames)
         self._inbox.put(frames)
