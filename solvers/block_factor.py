@@ -38,6 +38,14 @@ STEP = 8  # rows of a panel that are added up before their sum is stored
 _LOST_MOST = 1e-2
 
 
+class Entries(NamedTuple):
+    """A sparse matrix as compressed rows, columns ascending."""
+
+    starts: Indices
+    columns: Indices
+    values: Floats
+
+
 class Blocks(NamedTuple):
     """The factor's blocks, children before parents.
 
@@ -72,13 +80,47 @@ class Schedule(NamedTuple):
     tallest: int
 
 
+class Updates(NamedTuple):
+    """What a block passes on to its parent while the matrix is factored.
+
+    `rows` are the blocks' rows without private copies. The update of block b, where it is a task's
+    last block or a top block, is kept in kept[starts[b]:starts[b + 1]], so that other values in one
+    task do not concern the others.
+    """
+
+    parents: Indices
+    rows: Indices
+    starts: Offsets
+    kept: Floats
+
+
+class Work(NamedTuple):
+    """Room for a solve: vectors (n + copies, 3); a column of a block and sums, one a task."""
+
+    vectors: Singles
+    columns: Singles
+    sums: Singles
+
+
 class BlockFactor:
     """A factored symmetric positive definite matrix (n, n), given in the order of a dissection."""
 
     def __init__(self, matrix: sp.csr_matrix, tree: Dissection) -> None:
-        self._factorise(matrix, tree, np.float32)
-        if _lost_share(matrix, self) > _LOST_MOST:
-            self._factorise(matrix, tree, np.float64)
+        self._matrix = matrix.sorted_indices()
+        starts, columns = self._matrix.indptr.astype(np.int32), self._matrix.indices
+        self._entries = Entries(starts, columns.astype(np.int32), self._matrix.data)
+        self._plan, self._schedule, self._updates = _plan(self._entries, tree)
+        self._fill(np.float32)
+
+    def refactor(self, values: Floats) -> None:
+        """Take other values for the matrix's entries, in the order of its compressed rows.
+
+        The order and the blocks stay, and so do the subtrees whose entries are the same.
+        """
+        stale = _stale_tasks(self._entries, values, self._blocks, self._schedule)
+        self._entries.values[:] = values
+        _factorise(self._entries, stale, self._blocks, self._schedule, self._updates)
+        self._check()
 
     def add_solution(self, b: Floats, x: Floats) -> None:
         """Add the solution y of A y = b, both (n, 3), to the first n rows of x."""
@@ -94,24 +136,48 @@ class BlockFactor:
         """The bytes that a solve reads of the factor."""
         return self._blocks.ups.nbytes + self._blocks.downs.nbytes + 2 * self._blocks.rows.nbytes
 
-    def _factorise(
-        self, matrix: sp.csr_matrix, tree: Dissection, precision: type[np.floating[Any]]
-    ) -> None:
-        starts, columns = matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32)
-        row_starts, rows = _symbolic(starts, columns, tree)
-        k, m = np.diff(tree.firsts).astype(np.int64), np.diff(row_starts)
-        up_starts = np.append(0, np.cumsum(_padded(k, STEP) * _padded(m, WIDTH)))
-        # The way down reads the blocks backwards: let it read memory forwards all the same.
-        down_sizes = _padded(k + m, STEP) * _padded(k, WIDTH)
-        down_starts = np.append(0, np.cumsum(down_sizes[::-1]))[::-1].copy()
-        ups, downs = np.zeros(up_starts[-1], precision), np.zeros(down_starts[0], precision)
-        blocks = Blocks(tree.firsts, row_starts, rows, up_starts, ups, down_starts, downs)
-        _factorise(starts, columns, matrix.data, tree.parents, blocks)
-        self._schedule = _schedule(tree, k * (k + m), int((k + m).max(initial=0)) + STEP)
-        count = len(tree.order)
-        self._blocks = blocks._replace(rows=_private_rows(blocks, self._schedule, count))
-        copies = len(self._schedule.task_firsts) * len(self._schedule.shared)
-        self._work = np.zeros((count + copies, 3), precision)
+    def _fill(self, precision: type[np.floating[Any]]) -> None:
+        plan, schedule = self._plan, self._schedule
+        ups = np.zeros(plan.up_starts[-1], precision)
+        downs = np.zeros(plan.down_starts[0], precision)
+        self._blocks = plan._replace(ups=ups, downs=downs)
+        tasks = len(schedule.task_firsts)
+        self._work = Work(
+            np.zeros((self._matrix.shape[0] + tasks * len(schedule.shared), 3), precision),
+            np.zeros((tasks + 1, schedule.tallest, 3), precision),
+            np.zeros((tasks + 1, 4 * WIDTH), precision),
+        )
+        every = np.ones(tasks, np.bool_)
+        _factorise(self._entries, every, self._blocks, schedule, self._updates)
+        self._check()
+
+    def _check(self) -> None:
+        """Go over to double precision, for good, where single precision loses too much."""
+        if self._blocks.ups.dtype == np.float32 and _lost_share(self._matrix, self) > _LOST_MOST:
+            self._fill(np.float64)
+
+
+def _plan(entries: Entries, tree: Dissection) -> tuple[Blocks, Schedule, Updates]:
+    """All that does not depend on the matrix's values; the blocks are empty."""
+    row_starts, rows = _symbolic(entries.starts, entries.columns, tree)
+    k, m = np.diff(tree.firsts).astype(np.int64), np.diff(row_starts)
+    up_starts = np.append(0, np.cumsum(_padded(k, STEP) * _padded(m, WIDTH)))
+    # The way down reads the blocks backwards: let it read memory forwards all the same.
+    down_sizes = _padded(k + m, STEP) * _padded(k, WIDTH)
+    down_starts = np.append(0, np.cumsum(down_sizes[::-1]))[::-1].copy()
+    schedule = _schedule(tree, k * (k + m), int((k + m).max(initial=0)) + STEP)
+    empty = np.zeros(0, np.float32)
+    blocks = Blocks(tree.firsts, row_starts, rows, up_starts, empty, down_starts, empty)
+    keepers = np.concatenate([schedule.task_lasts, schedule.tops])
+    sizes = np.zeros(len(k), np.int64)
+    sizes[keepers] = m[keepers] ** 2
+    starts = np.append(0, np.cumsum(sizes))
+    updates = Updates(tree.parents, rows, starts, np.zeros(starts[-1]))
+    return (
+        blocks._replace(rows=_private_rows(blocks, schedule, len(tree.order))),
+        schedule,
+        updates,
+    )
 
 
 def _lost_share(matrix: sp.csr_matrix, factor: BlockFactor) -> float:
@@ -187,7 +253,7 @@ def _private_rows(blocks: Blocks, schedule: Schedule, count: int) -> Indices:
 
 
 @parallel_kernel
-def _add_solution(blocks: Blocks, schedule: Schedule, b: Floats, x: Floats, work: Singles) -> None:
+def _add_solution(blocks: Blocks, schedule: Schedule, b: Floats, x: Floats, work: Work) -> None:
     """Up all tasks' subtrees at once, up and down the blocks above them, down the subtrees."""
     for task in prange(len(schedule.task_firsts)):
         _climb(blocks, schedule, task, b, work)
@@ -197,95 +263,93 @@ def _add_solution(blocks: Blocks, schedule: Schedule, b: Floats, x: Floats, work
 
 
 @kernel
-def _climb(blocks: Blocks, schedule: Schedule, task: int, b: Floats, work: Singles) -> None:
+def _climb(blocks: Blocks, schedule: Schedule, task: int, b: Floats, work: Work) -> None:
     """Forward substitution in a task's subtree."""
     first, last = schedule.task_firsts[task], schedule.task_lasts[task]
+    y = work.vectors
     for v in range(blocks.firsts[first], blocks.firsts[last + 1]):
-        work[v, 0], work[v, 1], work[v, 2] = b[v, 0], b[v, 1], b[v, 2]
+        y[v, 0], y[v, 1], y[v, 2] = b[v, 0], b[v, 1], b[v, 2]
     copies = len(b) + task * len(schedule.shared)
-    work[copies : copies + len(schedule.shared)] = 0.0
-    scratch = np.empty((schedule.tallest, 3), work.dtype)
+    y[copies : copies + len(schedule.shared)] = 0.0
     for block in range(first, last + 1):
-        _send_up(blocks, block, work, scratch)
+        _send_up(blocks, block, y, work.columns[task], work.sums[task])
 
 
 @kernel
-def _turn(blocks: Blocks, schedule: Schedule, b: Floats, x: Floats, work: Singles) -> None:
+def _turn(blocks: Blocks, schedule: Schedule, b: Floats, x: Floats, work: Work) -> None:
     """Both substitutions in the blocks above the tasks; the tasks' updates are added in order."""
     shared, tasks = schedule.shared, len(schedule.task_firsts)
+    y = work.vectors
     for h in range(len(shared)):
         v = shared[h]
         for d in range(3):
-            work[v, d] = b[v, d]
+            y[v, d] = b[v, d]
             for t in range(tasks):
-                work[v, d] += work[len(b) + t * len(shared) + h, d]
-    scratch = np.empty((schedule.tallest, 3), work.dtype)
+                y[v, d] += y[len(b) + t * len(shared) + h, d]
     for block in schedule.tops:
-        _send_up(blocks, block, work, scratch)
+        _send_up(blocks, block, y, work.columns[tasks], work.sums[tasks])
     for block in schedule.tops[::-1]:
-        _send_down(blocks, block, work, scratch)
+        _send_down(blocks, block, y, work.columns[tasks], work.sums[tasks])
     for h in range(len(shared)):
         v = shared[h]
         for d in range(3):
-            x[v, d] += work[v, d]
+            x[v, d] += y[v, d]
             for t in range(tasks):
-                work[len(b) + t * len(shared) + h, d] = work[v, d]
+                y[len(b) + t * len(shared) + h, d] = y[v, d]
 
 
 @kernel
-def _descend(blocks: Blocks, schedule: Schedule, task: int, x: Floats, work: Singles) -> None:
+def _descend(blocks: Blocks, schedule: Schedule, task: int, x: Floats, work: Work) -> None:
     """Backward substitution in a task's subtree; the solution is added to x."""
     first, last = schedule.task_firsts[task], schedule.task_lasts[task]
-    scratch = np.empty((schedule.tallest, 3), work.dtype)
+    y = work.vectors
     for block in range(last, first - 1, -1):
-        _send_down(blocks, block, work, scratch)
+        _send_down(blocks, block, y, work.columns[task], work.sums[task])
     for v in range(blocks.firsts[first], blocks.firsts[last + 1]):
         for d in range(3):
-            x[v, d] += work[v, d]
+            x[v, d] += y[v, d]
 
 
 @kernel
-def _send_up(blocks: Blocks, block: int, work: Singles, scratch: Singles) -> None:
+def _send_up(blocks: Blocks, block: int, y: Singles, column: Singles, sums: Singles) -> None:
     """Forward substitution of one block: take G b from the later unknowns that it touches."""
     first = blocks.firsts[block]
     k = blocks.firsts[block + 1] - first
     rows = blocks.rows[blocks.row_starts[block] : blocks.row_starts[block + 1]]
     height = (k + STEP - 1) // STEP * STEP
-    scratch[:k] = work[first : first + k]
-    scratch[k:height] = 0.0
-    sums = np.empty(3 * WIDTH, work.dtype)
+    column[:k] = y[first : first + k]
+    column[k:height] = 0.0
     at = blocks.up_starts[block]
     for low in range(0, len(rows), WIDTH):
-        _multiply(scratch, blocks.ups[at : at + height * WIDTH], sums)
+        _multiply(column, blocks.ups[at : at + height * WIDTH], sums)
         at += height * WIDTH
         for h in range(min(WIDTH, len(rows) - low)):
             v = rows[low + h]
-            work[v, 0] += sums[h]
-            work[v, 1] += sums[WIDTH + h]
-            work[v, 2] += sums[2 * WIDTH + h]
+            y[v, 0] += sums[h]
+            y[v, 1] += sums[WIDTH + h]
+            y[v, 2] += sums[2 * WIDTH + h]
 
 
 @kernel
-def _send_down(blocks: Blocks, block: int, work: Singles, scratch: Singles) -> None:
+def _send_down(blocks: Blocks, block: int, y: Singles, column: Singles, sums: Singles) -> None:
     """Backward substitution of one block: its pivot's inverse times b, less G^T times the later."""
     first = blocks.firsts[block]
     k = blocks.firsts[block + 1] - first
     rows = blocks.rows[blocks.row_starts[block] : blocks.row_starts[block + 1]]
     size = k + len(rows)
     height = (size + STEP - 1) // STEP * STEP
-    scratch[:k] = work[first : first + k]
+    column[:k] = y[first : first + k]
     for h in range(len(rows)):
         v = rows[h]
-        scratch[k + h, 0], scratch[k + h, 1], scratch[k + h, 2] = work[v, 0], work[v, 1], work[v, 2]
-    scratch[size:height] = 0.0
-    sums = np.empty(3 * WIDTH, work.dtype)
+        column[k + h, 0], column[k + h, 1], column[k + h, 2] = y[v, 0], y[v, 1], y[v, 2]
+    column[size:height] = 0.0
     at = blocks.down_starts[block + 1]
     for low in range(0, k, WIDTH):
-        _multiply(scratch, blocks.downs[at : at + height * WIDTH], sums)
+        _multiply(column, blocks.downs[at : at + height * WIDTH], sums)
         at += height * WIDTH
         for h in range(min(WIDTH, k - low)):
             v = first + low + h
-            work[v, 0], work[v, 1], work[v, 2] = sums[h], sums[WIDTH + h], sums[2 * WIDTH + h]
+            y[v, 0], y[v, 1], y[v, 2] = sums[h], sums[WIDTH + h], sums[2 * WIDTH + h]
 
 
 @kernel
@@ -366,49 +430,118 @@ def _append(rows: Indices, filled: int, value: int) -> tuple[Indices, int]:
 
 
 @kernel
+def _stale_tasks(
+    entries: Entries, values: Floats, blocks: Blocks, schedule: Schedule
+) -> NDArray[np.bool_]:
+    """Which tasks hold an entry that is not the same any more."""
+    stale = np.zeros(len(schedule.task_firsts), np.bool_)
+    for t in range(len(stale)):
+        first = blocks.firsts[schedule.task_firsts[t]]
+        last = blocks.firsts[schedule.task_lasts[t] + 1]
+        for h in range(entries.starts[first], entries.starts[last]):
+            if entries.values[h] != values[h]:
+                stale[t] = True
+                break
+    return stale
+
+
+@parallel_kernel
 def _factorise(
-    starts: Indices, columns: Indices, data: Floats, parents: Indices, blocks: Blocks
+    entries: Entries,
+    stale: NDArray[np.bool_],
+    blocks: Blocks,
+    schedule: Schedule,
+    updates: Updates,
 ) -> None:
-    """Fill the blocks' values, block by block from the leaves of the tree to its root."""
-    firsts, row_starts, rows = blocks.firsts, blocks.row_starts, blocks.rows
-    count = len(firsts) - 1
-    place = np.empty(len(starts), np.int32)
-    pending = np.empty(count, np.int64)  # blocks whose update waits for their parent
+    """Fill the blocks' values: those of stale tasks at the same time, then the blocks above."""
+    for task in prange(len(stale)):
+        if stale[task]:
+            _factorise_subtree(entries, task, blocks, schedule, updates)
+    _factorise_tops(entries, blocks, schedule, updates)
+
+
+@kernel
+def _factorise_subtree(
+    entries: Entries, task: int, blocks: Blocks, schedule: Schedule, updates: Updates
+) -> None:
+    """Fill a task's blocks from the leaves of its subtree to the root, whose update is kept."""
+    first, last = schedule.task_firsts[task], schedule.task_lasts[task]
+    place = np.empty(len(entries.starts), np.int32)
+    pending = np.empty(last - first + 1, np.int64)  # blocks whose update waits for their parent
     waiting = 0
     depth = 0
     stack = np.empty(1 << 16)
-    for b in range(count):
-        first, last = firsts[b], firsts[b + 1]
-        k, m = last - first, row_starts[b + 1] - row_starts[b]
-        for v in range(first, last):
-            place[v] = v - first
-        for h in range(m):
-            place[rows[row_starts[b] + h]] = k + h
-        front = np.zeros((k + m, k + m))
-        for v in range(first, last):
-            for h in range(starts[v], starts[v + 1]):
-                if columns[h] >= first:
-                    front[place[columns[h]], v - first] = data[h]
-        while waiting > 0 and parents[pending[waiting - 1]] == b:
+    for b in range(first, last + 1):
+        front = _front(entries, b, blocks, updates, place)
+        while waiting > 0 and updates.parents[pending[waiting - 1]] == b:
             waiting -= 1
-            c = pending[waiting]
-            touched = rows[row_starts[c] : row_starts[c + 1]]
+            touched = _touched(blocks, updates, pending[waiting])
             size = len(touched)
             depth -= size * size
             update = stack[depth : depth + size * size].reshape((size, size))
             _extend_add(update, touched, place, front)
-        up = blocks.ups[blocks.up_starts[b] : blocks.up_starts[b + 1]]
-        down = blocks.downs[blocks.down_starts[b + 1] : blocks.down_starts[b]]
-        corner = _eliminate(front, k, up, down)
-        if m:
-            if depth + m * m > len(stack):
-                longer = np.empty(2 * (depth + m * m))
+        corner = _eliminate(front, b, blocks)
+        if b == last:
+            _kept(blocks, updates, b)[:] = corner
+        elif corner.size:
+            if depth + corner.size > len(stack):
+                longer = np.empty(2 * (depth + corner.size))
                 longer[:depth] = stack[:depth]
                 stack = longer
-            stack[depth : depth + m * m] = corner.ravel()
-            depth += m * m
+            stack[depth : depth + corner.size] = corner.ravel()
+            depth += corner.size
             pending[waiting] = b
             waiting += 1
+
+
+@kernel
+def _factorise_tops(entries: Entries, blocks: Blocks, schedule: Schedule, updates: Updates) -> None:
+    """Fill the blocks above the tasks."""
+    place = np.empty(len(entries.starts), np.int32)
+    for b in schedule.tops:
+        front = _front(entries, b, blocks, updates, place)
+        for c in range(b):
+            if updates.parents[c] == b:
+                touched = _touched(blocks, updates, c)
+                _extend_add(_kept(blocks, updates, c), touched, place, front)
+        _kept(blocks, updates, b)[:] = _eliminate(front, b, blocks)
+
+
+@kernel
+def _touched(blocks: Blocks, updates: Updates, block: int) -> Indices:
+    """The later unknowns that a block touches."""
+    rows: Indices = updates.rows[blocks.row_starts[block] : blocks.row_starts[block + 1]]
+    return rows
+
+
+@kernel
+def _kept(blocks: Blocks, updates: Updates, block: int) -> Floats:
+    """Where the update of a block is kept, (m, m)."""
+    size = blocks.row_starts[block + 1] - blocks.row_starts[block]
+    kept = updates.kept[updates.starts[block] : updates.starts[block + 1]]
+    update: Floats = kept.reshape((size, size))
+    return update
+
+
+@kernel
+def _front(
+    entries: Entries, block: int, blocks: Blocks, updates: Updates, place: Indices
+) -> Floats:
+    """The matrix's own entries of one block; `place` gets to know where its unknowns are."""
+    first, last = blocks.firsts[block], blocks.firsts[block + 1]
+    touched = _touched(blocks, updates, block)
+    k = last - first
+    for v in range(first, last):
+        place[v] = v - first
+    for h in range(len(touched)):
+        place[touched[h]] = k + h
+    front = np.zeros((k + len(touched), k + len(touched)))
+    for v in range(first, last):
+        for h in range(entries.starts[v], entries.starts[v + 1]):
+            u = entries.columns[h]
+            if u >= first:
+                front[place[u], v - first] = entries.values[h]
+    return front
 
 
 @kernel
@@ -421,17 +554,18 @@ def _extend_add(update: Floats, touched: Indices, place: Indices, front: Floats)
 
 
 @kernel
-def _eliminate(front: Floats, k: int, up: Singles, down: Singles) -> Floats:
+def _eliminate(front: Floats, block: int, blocks: Blocks) -> Floats:
     """Invert the pivot block, store what both ways need; what is left for the later unknowns."""
+    k = blocks.firsts[block + 1] - blocks.firsts[block]
     size = len(front)
     inverse = np.linalg.inv(front[:k, :k].copy())
     below = front[k:, :k].copy()
     G = np.dot(below, inverse)
-    _lay_panels(-G.T, up)
-    down_matrix = np.empty((size, k))
-    down_matrix[:k] = inverse
-    down_matrix[k:] = -G
-    _lay_panels(down_matrix, down)
+    _lay_panels(-G.T, blocks.ups[blocks.up_starts[block] : blocks.up_starts[block + 1]])
+    down = np.empty((size, k))
+    down[:k] = inverse
+    down[k:] = -G
+    _lay_panels(down, blocks.downs[blocks.down_starts[block + 1] : blocks.down_starts[block]])
     rest: Floats = front[k:, k:] - np.dot(G, below.T.copy())
     return rest
 
