@@ -148,6 +148,6 @@ class Recorder:
 
     def _fail(self, error: InputError) -> None:
         if not self._fault:
-            self._fault = str(error)
-            kept = f"its first {self.frames} frames are kept" if self.path.exists() else ""
-            self._tell(f"{error}; recording has stopped" + (kept and f", {kept}"))
+            kept = f", its first {self._writer.safe} frames are kept" if self.path.exists() else ""
+            self._fault = f"{error}; the recording has stopped{kept}"
+            self._tell(self._fault)

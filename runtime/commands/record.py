@@ -6,41 +6,75 @@ import argparse
 import math
 import sys
 import time
+from collections.abc import Callable
 
+from devices.errors import InputError
+from devices.skeleton import SkeletonFrame
 from devices.stream import SkeletonStream, open_stream
-from replay.mcap_writer import McapWriter
+from replay.recorded_stream import RecordedStream
+from replay.recorder import Recorder
 from runtime.clock import Ticker
 from runtime.interrupt import held
 from runtime.output.whole_file import check_writable
+from runtime.provenance import provenance
+from runtime.warn import warn
 
 POLLS = 240.0  # a second: twice the fastest sensor
 
 
 def record(options: argparse.Namespace) -> int:
-    """Write every frame that comes until Ctrl-C or `--seconds`."""
+    """Write every frame that comes until Ctrl-C or `--seconds`.
+
+    Raises:
+        InputError: the device cannot be opened, or the disk fails; the frames until then are kept.
+    """
     check_writable(options.out)
+    warnings: list[str] = []
     with open_stream(options.device) as stream:
-        writer = McapWriter(options.out, stream.skeleton)
+        recorder = Recorder(
+            options.out,
+            stream.skeleton,
+            source=provenance(options.device),
+            tell=warnings.append,
+        )
+        seconds = options.seconds or math.inf
+        recorded = RecordedStream(stream, _first_seconds(recorder.offer, seconds))
         try:
-            _write_all(stream, writer, options.seconds or math.inf)
+            _watch(recorded, recorder, warnings, seconds)
         finally:
             with held():
-                writer.close()
-            print(f"bunraku: {writer.frames} frames in {options.out}", file=sys.stderr)
+                recorder.close()
+            lost = f", {recorder.lost} lost" if recorder.lost else ""
+            print(f"bunraku: {recorder.frames} frames in {options.out}{lost}", file=sys.stderr)
+    if recorder.fault:
+        raise InputError(recorder.fault)
     return 0
 
 
-def _write_all(stream: SkeletonStream, writer: McapWriter, seconds: float) -> None:
-    """Write what comes within `seconds` of the first frame; wait no longer than that for any."""
+def _first_seconds(
+    keep: Callable[[SkeletonFrame], None], seconds: float
+) -> Callable[[SkeletonFrame], None]:
+    """`keep` for frames of less than `seconds` [s] after the first, nothing for those after."""
+    began: float | None = None
+
+    def take(frame: SkeletonFrame) -> None:
+        nonlocal began
+        began = frame.time if began is None else began
+        if frame.time - began < seconds:
+            keep(frame)
+
+    return take
+
+
+def _watch(stream: SkeletonStream, recorder: Recorder, warnings: list[str], seconds: float) -> None:
+    """Let frames come for so long [s], or until the recorder fails, and say what it has to say."""
     ticker = Ticker(POLLS)
     began = time.monotonic()
-    first: float | None = None
     over = False
-    while not (stream.ended or over):
+    while not (stream.ended or over or recorder.fault):
         over = time.monotonic() - began >= seconds
         with held():
-            for frame in stream.poll():
-                first = frame.time if first is None else first
-                if frame.time - first < seconds:
-                    writer.write(frame)
+            stream.poll()
+        while warnings and not recorder.fault:
+            warn(warnings.pop(0))
         ticker.wait()

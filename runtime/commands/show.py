@@ -8,12 +8,14 @@ import sys
 from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
+from pathlib import Path
 
 from devices.stream import SkeletonStream, open_stream
 from replay.builtin import builtin_recording
 from replay.formats import read_recording
-from replay.mcap_writer import McapWriter
 from replay.player import EveryFrame, Player, RealTime
+from replay.recorded_stream import RecordedStream
+from replay.recorder import Recorder
 from replay.recording import Recording
 from runtime.cast import character_named
 from runtime.characters.builtin import BUILTIN
@@ -27,11 +29,13 @@ from runtime.mapping import Mapping, read_mapping
 from runtime.output.report import MatchedPair, Report
 from runtime.performer import Performer
 from runtime.progress import Progress
+from runtime.provenance import provenance
 from runtime.puppet import Puppet
 from runtime.rehearsal import rehearse
 from runtime.render.camera import front_camera
 from runtime.render.context import headless_context, release_headless
 from runtime.theatre import Theatre
+from runtime.warn import warn
 from runtime.window import Window
 
 TICKS = 60.0  # a second, where nothing else sets the pace
@@ -44,12 +48,14 @@ class _Source:
 
     Attributes:
         stream: gives the frames.
+        origin: what it is called in a recording of it.
         rate: about how many come in a second.
         recording: what is played, or None when live.
         patience: how long [s] a match must stand before it performs by itself.
     """
 
     stream: SkeletonStream
+    origin: str
     rate: float
     recording: Recording | None
     patience: float
@@ -60,17 +66,19 @@ def demo(options: argparse.Namespace) -> int:
     options.character = options.character or list(BUILTIN)
     if not _has_display():
         options.headless = options.fast = True
-    return _show(options, lambda: _played(builtin_recording("show"), options))
+    return _show(options, lambda: _played("show", builtin_recording("show"), options))
 
 
 def replay(options: argparse.Namespace) -> int:
     """Let a recorded stream drive characters."""
-    return _show(options, lambda: _played(read_recording(options.recording), options))
+    path: Path = options.recording
+    return _show(options, lambda: _played(path.name, read_recording(path), options))
 
 
 def live(options: argparse.Namespace) -> int:
     """Let a live stream drive characters."""
-    return _show(options, lambda: _Source(open_stream(options.device), TICKS, None, STEADY))
+    url = options.device
+    return _show(options, lambda: _Source(open_stream(url), url, TICKS, None, STEADY))
 
 
 def _has_display() -> bool:
@@ -79,11 +87,11 @@ def _has_display() -> bool:
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
-def _played(recording: Recording, options: argparse.Namespace) -> _Source:
+def _played(name: str, recording: Recording, options: argparse.Namespace) -> _Source:
     pace = EveryFrame() if options.fast else RealTime(options.speed)
     seconds = recording.seconds
     rate = (len(recording) - 1) / seconds if seconds > 0.0 else TICKS
-    return _Source(Player(recording, pace, loop=options.loop), rate, recording, 0.0)
+    return _Source(Player(recording, pace, loop=options.loop), name, rate, recording, 0.0)
 
 
 def _show(options: argparse.Namespace, open_source: Callable[[], _Source]) -> int:
@@ -105,7 +113,7 @@ class _Show:
         self._options = options
         self._source = source
         self._closing = closing
-        self._stream = closing.enter_context(source.stream)
+        self._stream = closing.enter_context(RecordedStream(source.stream))
         self._performer = Performer(self._stream.skeleton, options.source)
         characters = [character_named(name) for name in options.character]
         self._report = Report(options.report)
@@ -130,7 +138,8 @@ class _Show:
         progress = self._closing.enter_context(Progress("performing", total))
         controls = None
         if self._window is not None and self._theatre is not None:
-            controls = Controls(self._window, self._theatre, self._director, self._stream)
+            played = self._source.stream
+            controls = Controls(self._window, self._theatre, self._director, played)
         ticker = None if options.fast else Ticker(TICKS)
         while not self._stream.ended and not (controls is not None and controls.leaving):
             with held():  # so that all outputs have the same frames
@@ -158,16 +167,26 @@ class _Show:
             report=self._report,
             theatre=self._theatre,
             outputs=open_outputs(self._options, cast, self._source.rate, self._closing),
-            recorder=self._open_recorder(),
             shown=self._window is not None,
         )
         self._closing.callback(self._tell, loop)
+        self._start_recording()
         return loop
 
-    def _open_recorder(self) -> McapWriter | None:
+    def _start_recording(self) -> None:
         if self._options.record is None:
-            return None
-        return self._closing.enter_context(McapWriter(self._options.record, self._stream.skeleton))
+            return
+        recorder = Recorder(
+            self._options.record,
+            self._stream.skeleton,
+            source=provenance(self._source.origin),
+            tell=warn,
+        )
+        self._closing.callback(self._report.kept, recorder)  # once it is closed
+        self._closing.enter_context(recorder)
+        # A recording that waits for the loop can wait for the disk as well, and loses nothing.
+        waits = self._options.fast and self._source.recording is not None
+        self._stream.keep = recorder.write if waits else recorder.offer
 
     def _open_theatre(self) -> Theatre | None:
         """The house, if anybody looks."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
+from replay.recorder import Recorder
 from runtime.character import Character
 from runtime.output.output import PerformedFrame
 from runtime.output.stage_times import StageTimes
@@ -92,7 +93,8 @@ class Part:
 class Report:
     """Collects the figures of a show and writes them as JSON at the end.
 
-    The keys: ``frames``, ``dropped``, ``recording`` {frames, joints, seconds}, ``character``
+    The keys: ``frames``, ``dropped``, ``recording`` {frames, joints, seconds}, ``record`` {frames,
+    lost, fault} of the recording that was made, or null, ``character``
     {vertices, faces, nodes}, ``match`` {score, pairs: [{source: [joint names], target: [node
     ids]}]}, ``stages_ms`` {poll, match, retarget, deform, render, publish, frame: {p50, p99, max}},
     ``stretch`` {mean, p99}. With several characters ``character``, ``match`` and ``stretch`` are
@@ -115,6 +117,7 @@ class Report:
             check_writable(path)
         self._path = path
         self._recording: dict[str, float] = {"frames": 0, "joints": 0, "seconds": 0.0}
+        self._record: dict[str, Any] | None = None
         self._parts: list[tuple[str, Part]] = []
         self.times = StageTimes()
         self.dropped = 0
@@ -125,6 +128,14 @@ class Report:
             "frames": int(frames),
             "joints": int(joints),
             "seconds": float(seconds),
+        }
+
+    def kept(self, recorder: Recorder) -> None:
+        """Say what became of the recording of the show."""
+        self._record = {
+            "frames": recorder.frames,
+            "lost": recorder.lost,
+            "fault": recorder.fault or None,
         }
 
     def cast(self, character: Character) -> Part:
@@ -141,6 +152,7 @@ class Report:
             "frames": max((part.frames for _, part in self._parts), default=0),
             "dropped": int(self.dropped),
             "recording": self._recording,
+            "record": self._record,
             **first,
             "stages_ms": self.times.summary(),
         }

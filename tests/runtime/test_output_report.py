@@ -38,6 +38,7 @@ def test_the_report_has_the_keys_that_others_read(tmp_path: Path) -> None:
         "frames": 7,
         "dropped": 2,
         "recording": {"frames": 9, "joints": 25, "seconds": 0.5},
+        "record": None,
         "character": {
             "vertices": len(character.vertices),
             "faces": len(character.faces),
