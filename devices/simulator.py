@@ -1,4 +1,7 @@
-"""A performer who is always there: ``sim://show``, ``sim://wave`` and so on, looping for ever."""
+"""Performers who are always there: ``sim://show``, ``sim://wave`` and so on, looping for ever.
+
+Option: ``performers=N``, who stand side by side, each a second behind the one before.
+"""
 
 from __future__ import annotations
 
@@ -10,11 +13,14 @@ from urllib.parse import SplitResult
 import numpy as np
 
 from devices.acts import ACTS, performance
+from devices.address import options_of
 from devices.performance import RATE, Performance
 from devices.skeleton import Skeleton, SkeletonFrame
 
 BACKLOG_SECONDS = 1.0
 """What lies further back than this when a poll comes is not given any more."""
+MOST_PERFORMERS = 64
+_APART = 1.2  # [m] between one performer and the next
 
 
 class Simulator:
@@ -22,13 +28,19 @@ class Simulator:
 
     Args:
         performance: what is played, again and again.
+        performers: how many play it.
         clock: host monotonic time [s]; the performance begins with the first poll.
     """
 
     def __init__(
-        self, performance: Performance, clock: Callable[[], float] = time.monotonic
+        self,
+        performance: Performance,
+        clock: Callable[[], float] = time.monotonic,
+        *,
+        performers: int = 1,
     ) -> None:
         self._performance = performance
+        self._performers = range(performers)
         self._clock = clock
         self._start: float | None = None
         self._next = 0
@@ -55,15 +67,21 @@ class Simulator:
         due = int((now - self._start) * RATE + 1e-6) + 1
         first = max(self._next, due - int(BACKLOG_SECONDS * RATE))
         self._next = max(self._next, due)
-        return [self._frame(number, self._start, now) for number in range(first, due)]
+        return [
+            self._frame(number, performer, self._start, now)
+            for number in range(first, due)
+            for performer in self._performers
+        ]
 
-    def _frame(self, number: int, start: float, now: float) -> SkeletonFrame:
-        index = number % len(self._performance.times)
+    def _frame(self, number: int, performer: int, start: float, now: float) -> SkeletonFrame:
+        index = (number - performer * int(RATE)) % len(self._performance.times)
+        aside = np.array([_APART * ((performer + 1) // 2) * (-1) ** performer, 0.0, 0.0])
         return SkeletonFrame(
             time=start + number / RATE,
-            positions=self._performance.positions[index],
+            positions=self._performance.positions[index] + aside,
             rotations=self._performance.rotations[index],
             confidence=np.ones(len(self.skeleton.names)),
+            performer=performer,
             arrival=now,
         )
 
@@ -80,4 +98,11 @@ class Simulator:
 
 def open_device(address: SplitResult) -> Simulator:
     """Open ``sim://ACT``; the first act where none is named."""
-    return Simulator(performance(address.netloc or ACTS[0]))
+    options = options_of(address, {"performers": _company})
+    return Simulator(performance(address.netloc or ACTS[0]), **options)
+
+
+def _company(text: str) -> int:
+    if not (text.isascii() and text.isdigit() and 1 <= int(text[:9]) <= MOST_PERFORMERS):
+        raise ValueError(f"expected a whole number from 1 to {MOST_PERFORMERS}")
+    return int(text)

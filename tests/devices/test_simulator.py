@@ -179,3 +179,24 @@ def test_the_recording_is_the_same_performance() -> None:
     assert np.linalg.norm(recording.rotations, axis=2) == pytest.approx(1.0, abs=1e-12)
     with pytest.raises(InputError, match="built-in performance"):
         builtin_recording("nonsense")
+
+
+def test_several_performers_stand_side_by_side_at_the_same_times() -> None:
+    now = [100.0]
+    act = performance("wave")
+    with devices.simulator.Simulator(act, lambda: now[0], performers=4) as stream:
+        stream.poll()
+        now[0] += 1.0
+        frames = stream.poll()
+    assert [frame.performer for frame in frames] == [0, 1, 2, 3] * 60
+    hips = [frame.positions[act.skeleton.root, 0] for frame in frames[:4]]
+    assert np.diff(sorted(hips)).min() > 1.0
+    alone = {frame.time: frame for frame in frames if frame.performer == 0}
+    assert len(alone) == 60
+    np.testing.assert_array_equal(frames[0].positions, act.positions[1])
+
+
+@pytest.mark.parametrize("wrong", ["0", "-1", "many", "65", "9" * 5000, "²"])
+def test_a_strange_number_of_performers_is_refused(wrong: str) -> None:
+    with pytest.raises(InputError, match="whole number from 1 to 64"):
+        open_stream(f"sim://wave?performers={wrong}")
