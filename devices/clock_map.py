@@ -6,6 +6,7 @@ import math
 
 WINDOW = 5.0  # [s] of arrivals that one minimum is taken over
 FARTHEST = 1.0  # [s] a mapped time may lie before its arrival
+LARGEST = 1e11  # [s] of a device clock: 3000 years; more has no milliseconds left in a float64
 STEP_BACK = 0.25  # [s] that no packet is late by on a local network
 
 
@@ -33,9 +34,9 @@ class ClockMap:
         """The host's time [s] of what the device stamped `device` [s] and that came at `arrival`.
 
         Never after the arrival, and never before what was returned last while arrivals do not
-        fall. A stamp that is not a finite number is taken for the arrival.
+        fall. A stamp that is no number, or as large as none is, is taken for the arrival.
         """
-        if not math.isfinite(device):
+        if not abs(device) < LARGEST:  # NaN is not
             return arrival
         offset = arrival - device
         if self._began is None:

@@ -37,7 +37,16 @@ class SkeletonStream(Protocol):
     def __exit__(self, *exc: object) -> None: ...
 
 
-ADAPTERS = {"sim": "devices.simulator"}
+ADAPTERS = {
+    "sim": "devices.simulator",
+    "vmc": "devices.vmc",
+    "vrchat": "devices.vrchat",
+    "kinect": "devices.kinect",
+    "leap": "devices.leapc",
+    "leap+ws": "devices.leap_websocket",
+    "mediapipe": "devices.mediapipe_stream",
+    "zmq+tcp": "devices.bridge_stream",
+}
 """The module of each kind of address. It has `open_device(address: SplitResult)`, and is imported
 only when such an address is opened, so that an SDK that is not there troubles nobody else."""
 

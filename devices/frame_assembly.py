@@ -1,0 +1,78 @@
+"""Which messages make one frame, in protocols that have no mark for it (VMC, VRChat)."""
+
+from __future__ import annotations
+
+from collections import deque
+from statistics import median
+
+HALF = 0.5  # of a period without anything ends a frame
+UNKNOWN_GAP = 0.004  # [s] that ends one while the period is not known
+LONGEST_GAP = 0.25  # [s]
+KEPT_PERIODS = 9
+REMEMBERED_FRAMES = 30  # a part that none of these had is not waited for
+
+
+class FrameAssembly:
+    """Says when the parts that came make a frame.
+
+    A frame ends (a) when a time or status comes after parts, (b) when a part comes again, (c) when
+    nothing has come for half a period, as the protocol's receivers do it; and, so that nobody waits
+    for the next frame to know that this one is whole, (d) at the end of the datagram with which
+    every part is there that lately was.
+
+    Attributes:
+        parts: the parts of the frame that is being put together.
+        newest: arrival [s] of its last part.
+    """
+
+    def __init__(self) -> None:
+        self.parts: set[int] = set()
+        self.newest = 0.0
+        self._began = 0.0
+        self._number = 0
+        self._last_in: dict[int, int] = {}
+        self._previous: float | None = None
+        self._periods: deque[float] = deque(maxlen=KEPT_PERIODS)
+
+    @property
+    def period(self) -> float | None:
+        """The median time [s] from frame to frame; None before three frames."""
+        return median(self._periods) if len(self._periods) > 1 else None
+
+    def add(self, part: int, arrival: float) -> None:
+        """Take in a part that came at `arrival` [s]."""
+        if not self.parts:
+            self._began = arrival
+        self.parts.add(part)
+        self.newest = arrival
+
+    def overdue(self, now: float) -> bool:
+        """Whether nothing has come for so long that the frame is over: rule (c)."""
+        if not self.parts:
+            return False
+        period = self.period
+        gap = UNKNOWN_GAP if period is None else min(HALF * period, LONGEST_GAP)
+        return now - self.newest > gap
+
+    @property
+    def whole(self) -> bool:
+        """Whether every part is there that one of the last frames had: rule (d)."""
+        return bool(self._last_in) and self._last_in.keys() <= self.parts
+
+    def end(self) -> None:
+        """The frame is over; the next part begins another."""
+        self._number += 1
+        for part in self.parts:
+            self._last_in[part] = self._number
+        oldest = self._number - REMEMBERED_FRAMES
+        self._last_in = {part: last for part, last in self._last_in.items() if last > oldest}
+        if self._previous is not None:
+            self._periods.append(self._began - self._previous)
+        self._previous = self._began
+        self.parts = set()
+
+    def restart(self) -> None:
+        """Another sender may follow: expect nothing of it."""
+        self._last_in.clear()
+        self._periods.clear()
+        self._previous = None
