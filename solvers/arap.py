@@ -17,30 +17,18 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import scipy.sparse as sp
 from numpy.typing import ArrayLike
-from scipy.spatial import KDTree
 
 from solvers.arap_cells import SPOKES, SPOKES_AND_RIMS, build_cells
-from solvers.arap_kernels import energy_terms, fit_cells, place_outside, residual
-from solvers.arap_layout import (
-    Frame,
-    Layout,
-    checked_handles,
-    checked_mesh,
-    checked_targets,
-    lay_out,
-)
-from solvers.block_factor import BlockFactor
-from solvers.handle_motion import (
-    Influences,
-    farthest_motion,
-    fit_motions,
-    follow,
-    follow_one_group,
-    harmonic_influences,
-)
-from solvers.laplacian import Floats, Ints
+from solvers.arap_kernels import energy_terms, fit_cells, place_outside, pull_soft, residual
+from solvers.arap_layout import Frame, checked_mesh, checked_targets, lay_out
+from solvers.compiled import most_threads, threads_for
+from solvers.following import Following
+from solvers.handle_motion import farthest_motion, fit_motions, follow, follow_one_group
+from solvers.handles import checked_handles, nearest_groups, unheld
+from solvers.held_system import HeldSystem, Hold
+from solvers.laplacian import Floats
+from solvers.rotation_fit import SCRATCH
 
 # A group that turned or went further than this between two frames has jumped: radians, and shares
 # of the character's size.
@@ -61,10 +49,11 @@ class ArapSolver:
         handles: vertex indices (H,), at least one, each once.
         energy: "spokes" (Sorkine and Alexa 2007) or "spokes-and-rims" (Chao et al. 2010).
         groups: which handles move rigidly together, any integers (H,); all of them by default.
+        weights: how firmly each handle is held (H,); see `hold`.
 
     Raises:
         ValueError: for wrong shapes, indices out of range, numbers that are not finite, an unknown
-            energy, or handles that are missing or repeated.
+            energy, handles that are missing or repeated, or a weight below zero.
     """
 
     def __init__(
@@ -75,51 +64,98 @@ class ArapSolver:
         *,
         energy: str = SPOKES,
         groups: ArrayLike | None = None,
+        weights: ArrayLike | None = None,
     ) -> None:
         points, triangles = checked_mesh(vertices, faces)
-        chosen, self._group_of, self._group_count = checked_handles(handles, groups, len(points))
         if energy not in (SPOKES, SPOKES_AND_RIMS):
             raise ValueError(f"unknown energy {energy!r}: use {SPOKES!r} or {SPOKES_AND_RIMS!r}")
         self._frame = Frame.around(points)
-        self._layout = layout = lay_out(points, triangles, chosen)
+        self._layout = layout = lay_out(points, triangles)
+        self._handles = checked_handles(handles, groups, weights, layout)
         self._rest = np.ascontiguousarray(self._frame.inside(points)[layout.order])
-        self._mesh = build_cells(self._rest[: layout.active], layout.faces, energy)
-        self._factor = BlockFactor(
-            sp.csr_matrix(self._mesh.laplacian[: layout.free, : layout.free]), layout.tree
-        )
-        self._influences = self._find_influences()
-        self._carriers = _nearest_groups(self._rest, layout, self._group_of)
-        self._R = np.empty((layout.active, 9))
-        self._laplace_x = np.empty((layout.active, 3))
-        self._residual = np.empty((layout.free, 3))
+        self._mesh = build_cells(self._rest, layout.faces, energy)
+        self._unit = float(self._mesh.laplacian.diagonal().mean()) or 1.0
+        self._carry()
+        self._system = HeldSystem(self._mesh.laplacian, layout.tree, self._held())
+        self._following = Following(self._system, self._handles)
+        count = len(points)
+        self._R = np.empty((count, 9))
+        self._laplace_x = np.empty((count, 3))
+        self._residual = np.empty((count, 3))
+        self._room = np.empty((most_threads(), SCRATCH))
         self._x = self._rest.copy()
         self._from_rest = np.empty_like(self._rest)
         self._energy_terms = np.empty(len(self._mesh.terms.cells))
+        self._goals = self._x[self._handles.places]
+
+    def hold(
+        self,
+        handles: ArrayLike,
+        *,
+        groups: ArrayLike | None = None,
+        weights: ArrayLike | None = None,
+    ) -> None:
+        """Hold these handles from now on instead of those before; the surface stays where it is.
+
+        Args:
+            handles: vertex indices (H,), at least one, each once.
+            groups: which of them move rigidly together, any integers (H,); all by default.
+            weights: how firmly each is held (H,): infinity, the default, where its target is met
+                exactly; 1 for a spring as stiff as the surface around a vertex; 0 lets go.
+
+        Raises:
+            ValueError: as the constructor; nothing changes then.
+        """
+        new = checked_handles(handles, groups, weights, self._layout)
+        goals = self._x[new.places]
+        _, old, kept = np.intersect1d(self._handles.places, new.places, return_indices=True)
+        goals[kept] = self._goals[old]
+        self._goals, self._handles = goals, new
+        self._carry()
+        self._system.hold(self._held())
+        self._following.hold(new)
+
+    def weigh(self, weights: ArrayLike) -> None:
+        """Hold the same handles as firmly as `weights` (H,) say from now on.
+
+        Raises:
+            ValueError: for weights of a wrong shape or below zero; nothing changes then.
+        """
+        self._handles = self._handles.reweighted(weights)
+        self._system.hold(self._held())
+        self._following.reweigh(self._handles)
 
     def reset(self) -> None:
         """Forget the last answer: the next solve starts from the rest pose."""
         self._x[:] = self._rest
+        self._goals = self._x[self._handles.places]
 
-    def solve(self, targets: ArrayLike, iterations: int = 1) -> Floats:
-        """Vertices (N, 3) that bring the handles to `targets` (H, 3), exactly.
+    def solve(
+        self, targets: ArrayLike, iterations: int = 1, *, out: Floats | None = None
+    ) -> Floats:
+        """Vertices (N, 3) that bring the handles to `targets` (H, 3), the hard ones exactly.
 
         Starts from the last answer, moved along with the handles, and takes `iterations` local and
-        global steps from there; zero gives the start itself.
+        global steps from there; zero gives the start itself. The answer is put into `out` where
+        one is given, and is a new array otherwise.
 
         Raises:
             ValueError: for targets of a wrong shape, not finite, or absurdly far away.
         """
-        layout = self._layout
-        goals = checked_targets(targets, layout.active - layout.free, self._frame)
+        goals = checked_targets(targets, len(self._handles.places), self._frame)
         if iterations < 0:
             raise ValueError(f"iterations must not be negative, got {iterations}")
-        self._move_along(self._frame.inside(goals))
-        for _ in range(iterations):
-            self._local_step(self._x)
-            self._global_step()
-        answer = np.empty_like(self._x)
-        place_outside(self._x, layout.order, self._frame.centre, self._frame.size, answer)
-        answer[layout.order[layout.free : layout.active]] = goals
+        answer = np.empty_like(self._x) if out is None else out
+        with threads_for(len(self._x)):
+            self._move_along(self._frame.inside(goals))
+            for _ in range(iterations):
+                self._local_step(self._x)
+                self._global_step()
+            shown = self._pose_step() if iterations else self._x
+            frame, order = self._frame, self._layout.order
+            place_outside(shown, order, frame.centre, frame.size, answer)
+        hard = self._handles.hard
+        answer[self._layout.order[self._handles.places[hard]]] = goals[hard]
         return answer
 
     @property
@@ -127,58 +163,70 @@ class ArapSolver:
         """The energy of the last answer under its best rotations, in the vertices' unit squared."""
         return self._energy_of(self._x) * self._frame.size**2
 
+    def rotations(self) -> Floats:
+        """How each vertex's cell was turned by the last iteration, (N, 3, 3)."""
+        return self._R[self._layout.place].reshape(-1, 3, 3)
+
     def _local_step(self, x: Floats) -> None:
-        fit_cells(x, self._mesh.cells, self._R, self._laplace_x)
+        fit_cells(x, self._mesh.cells, self._R, self._laplace_x, self._room)
 
     def _global_step(self) -> None:
-        residual(self._R, self._laplace_x, self._mesh.cells, self._residual)
-        self._factor.add_solution(self._residual, self._x)
+        held, places = self._system.held, self._handles.places
+        residual(self._R, self._laplace_x, self._mesh.cells, held.fixed, self._residual)
+        pull_soft(places, held.stiffness, self._goals, self._x, self._residual)
+        self._system.add_solution(self._residual, self._x)
+
+    def _pose_step(self) -> Floats:
+        """The surface to show (N, 3), once a frame."""
+        return self._x
 
     def _move_along(self, goals: Floats) -> None:
-        """Put the start of this frame's iterations into x: handles at their goals, (H, 3)."""
-        free, active = self._layout.free, self._layout.active
-        handles = slice(free, active)
-        here = self._x[handles].copy()
-        step = fit_motions(here, goals, self._group_of, self._group_count)
-        follow(self._x[:free], self._influences, step, self._x[:free])
-        self._x[handles] = goals
-        angle, path = farthest_motion(step, here, self._group_of)
-        has_jumped = angle > _JUMP_ANGLE or path > _JUMP_PATH
-        if not has_jumped and active == len(self._rest):
-            return
-        whole = fit_motions(self._rest[handles], goals, self._group_of, self._group_count)
-        follow(self._rest[active:], self._carriers, whole, self._x[active:])
-        if has_jumped:
-            follow(self._rest[:free], self._influences, whole, self._from_rest[:free])
-            self._from_rest[handles] = goals
+        """Put the start of this frame's iterations into x: hard handles at their goals, (H, 3)."""
+        handles, following = self._handles, self._following
+        following.advance()
+        step = following.motions(self._goals, goals)
+        angle, path = farthest_motion(step, self._goals, following.known)
+        follow(self._x, following.influences, step, self._x)
+        self._goals = goals
+        self._put_held(goals, self._x)
+        if angle > _JUMP_ANGLE or path > _JUMP_PATH:
+            whole = following.motions(self._rest[handles.places], goals)
+            follow(self._rest, following.influences, whole, self._from_rest)
+            self._put_held(goals, self._from_rest)
             if self._energy_of(self._from_rest) < _BETTER * self._energy_of(self._x):
-                self._x[:active] = self._from_rest[:active]
+                self._x[:] = self._from_rest
+
+    def _put_held(self, goals: Floats, x: Floats) -> None:
+        """Put what is not free into x: hard handles at their goals, carried parts beside theirs."""
+        handles = self._handles
+        x[handles.places[handles.hard]] = goals[handles.hard]
+        if len(self._carried):
+            rest = self._rest
+            whole = fit_motions(rest[handles.places], goals, handles.group_of, handles.count)
+            moved = np.empty((len(self._carried), 3))
+            follow(rest[self._carried], self._carriers, whole, moved)
+            x[self._carried] = moved
 
     def _energy_of(self, x: Floats) -> float:
         self._local_step(x)
         energy_terms(x, self._R, self._rest, self._mesh.terms, self._energy_terms)
         return float(self._energy_terms.sum())
 
-    def _find_influences(self) -> Influences:
-        free, active = self._layout.free, self._layout.active
-        coupling = -self._mesh.laplacian[:free, free:active]
-        return harmonic_influences(
-            self._factor.solve, sp.csr_matrix(coupling), self._group_of, self._group_count
+    def _carry(self) -> None:
+        """Find what no handle touches, and whom it goes along with."""
+        self._carried = unheld(self._handles, self._layout)
+        self._carriers = follow_one_group(
+            nearest_groups(self._rest, self._carried, self._handles, self._layout.parts)
         )
 
-
-def _nearest_groups(rest: Floats, layout: Layout, group_of: Ints) -> Influences:
-    """For each carried vertex, the group of the handle nearest to its component."""
-    carried = np.arange(layout.active, len(rest))
-    if not len(carried):
-        return follow_one_group(np.zeros(0, dtype=np.int64))
-    distance, handle = KDTree(rest[layout.free : layout.active]).query(rest[carried])
-    part_of = layout.parts[carried]
-    nearest_first = np.lexsort((carried, distance))
-    _, where = np.unique(part_of[nearest_first], return_index=True)
-    nearest = np.zeros(layout.parts.max() + 1, dtype=np.int64)
-    nearest[part_of[nearest_first][where]] = group_of[handle[nearest_first][where]]
-    return follow_one_group(nearest[part_of])
+    def _held(self) -> Hold:
+        handles = self._handles
+        fixed = np.zeros(len(self._rest), dtype=np.bool_)
+        fixed[self._carried] = True
+        fixed[handles.places[handles.hard]] = True
+        stiffness = np.zeros(len(self._rest))
+        stiffness[handles.places] = np.where(handles.hard, 0.0, handles.weights) * self._unit
+        return Hold(fixed, stiffness)
 
 
 def warm() -> None:

@@ -1,33 +1,36 @@
 """The local step, the global step's right-hand side, and the energy, as compiled kernels.
 
 Positions x (N, 3), rotations (N, 9) row-major; the cells' arrays are those of `solvers.arap_cells`.
-Free vertices come first; the rest are handles. Every kernel gives the same bits for any number of
-threads: blocks of vertices are independent, and sums are taken in one order.
+Every kernel gives the same bits for any number of threads: blocks of vertices are independent, and
+sums are taken in one order.
 """
 
 from __future__ import annotations
 
 import numpy as np
-from numba import prange
+from numba import get_thread_id, prange  # type: ignore[attr-defined]
+from numpy.typing import NDArray
 
 from solvers.arap_cells import Cells, Terms
-from solvers.compiled import parallel_kernel
+from solvers.compiled import kernel, parallel_kernel
 from solvers.laplacian import Floats, Ints
-from solvers.rotation_fit import LANES, SCRATCH, fit_rotations
+from solvers.rotation_fit import LANES, fit_rotations
 
 _R = 9 * LANES
 
 
 @parallel_kernel
-def fit_cells(x: Floats, cells: Cells, R: Floats, laplace_x: Floats) -> None:
+def fit_cells(x: Floats, cells: Cells, R: Floats, laplace_x: Floats, room: Floats) -> None:
     """The local step: each cell's best rotation into R; L x into laplace_x on the way.
+
+    `room` (threads, SCRATCH) is what each thread works in.
 
     Source: Sorkine and Alexa 2007, eqs. (5) and (6).
     """
     starts, neighbours, fits = cells.starts, cells.neighbours, cells.fits
     count = len(starts) - 1
     for block in prange((count + LANES - 1) // LANES):
-        lanes = np.empty(SCRATCH)
+        lanes = room[get_thread_id()]
         first = block * LANES
         size = min(LANES, count - first)
         for k in range(size):
@@ -62,8 +65,10 @@ def fit_cells(x: Floats, cells: Cells, R: Floats, laplace_x: Floats) -> None:
 
 
 @parallel_kernel
-def residual(R: Floats, laplace_x: Floats, cells: Cells, out: Floats) -> None:
-    """What is left of the global step's equations at the free vertices, out (free, 3) = b(R) - L x.
+def residual(
+    R: Floats, laplace_x: Floats, cells: Cells, fixed: NDArray[np.bool_], out: Floats
+) -> None:
+    """What is left of the global step's equations, out (N, 3) = b(R) - L x; 0 where x is fixed.
 
     Source: Sorkine and Alexa 2007, eq. (8), for the correction of x in place of x itself.
     """
@@ -72,6 +77,9 @@ def residual(R: Floats, laplace_x: Floats, cells: Cells, out: Floats) -> None:
     for block in prange((count + LANES - 1) // LANES):
         for first in range(block * LANES, min((block + 1) * LANES, count)):
             i = np.uint64(first)
+            if fixed[i]:
+                out[i, 0] = out[i, 1] = out[i, 2] = 0.0
+                continue
             v0, v1, v2 = own[i, 0], own[i, 1], own[i, 2]
             b0 = R[i, 0] * v0 + R[i, 1] * v1 + R[i, 2] * v2 - laplace_x[i, 0]
             b1 = R[i, 3] * v0 + R[i, 4] * v1 + R[i, 5] * v2 - laplace_x[i, 1]
@@ -83,6 +91,20 @@ def residual(R: Floats, laplace_x: Floats, cells: Cells, out: Floats) -> None:
                 b1 += R[j, 3] * v0 + R[j, 4] * v1 + R[j, 5] * v2
                 b2 += R[j, 6] * v0 + R[j, 7] * v1 + R[j, 8] * v2
             out[i, 0], out[i, 1], out[i, 2] = b0, b1, b2
+
+
+@kernel
+def pull_soft(places: Ints, stiffness: Floats, goals: Floats, x: Floats, out: Floats) -> None:
+    """Add to out (N, 3) what springs to goals (H, 3) pull at x; `stiffness` is by vertex (N,).
+
+    Source: Celikcan et al. 2015, eq. (3).
+    """
+    for h in range(len(places)):
+        v = places[h]
+        k = stiffness[v]
+        out[v, 0] += k * (goals[h, 0] - x[v, 0])
+        out[v, 1] += k * (goals[h, 1] - x[v, 1])
+        out[v, 2] += k * (goals[h, 2] - x[v, 2])
 
 
 @parallel_kernel

@@ -1,7 +1,7 @@
 """What a deformation solver is given, checked at the door and put into the order that it works in.
 
-The order is: free vertices, so that neighbours lie near each other in memory; handles, as given;
-and carried vertices, those of components without a handle and those without a face.
+The order is the factor's, so that neighbours lie near each other in memory. It does not depend on
+the handles, which may come and go.
 """
 
 from __future__ import annotations
@@ -40,17 +40,15 @@ class Frame:
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """Vertex order[k] of the mesh is vertex k of the solver.
+    """The working order of N vertices.
 
-    The first `free` are solved for, those up to `active` are the handles, the others carried.
-    `faces` (F', 3) are the solver's vertices, without the carried components' faces;
-    `parts` (N,) numbers the component of each of the solver's vertices; `tree` is the dissection of
-    the free ones, whose order they are in.
+    Vertex order[i] is worked on i-th, and place[v] says when vertex v is. `faces` (F, 3) and
+    `parts` (N,), the connected component of each vertex, are in that order; `tree` is the
+    dissection whose order it is.
     """
 
     order: Ints
-    free: int
-    active: int
+    place: Ints
     faces: Ints
     parts: Ints
     tree: Dissection
@@ -66,32 +64,12 @@ def checked_mesh(vertices: ArrayLike, faces: ArrayLike) -> tuple[Floats, Ints]:
         raise ValueError(f"vertex {bad} is not finite: {points[bad]}")
     if np.abs(points).max() > 1e100:
         raise ValueError("vertices beyond 1e100 are out of range")
-    triangles = _integers(faces, "faces").reshape(-1, 3) if np.size(faces) == 0 else faces
-    triangles = _integers(triangles, "faces")
+    triangles = checked_integers(faces, "faces").reshape(-1, 3) if np.size(faces) == 0 else faces
+    triangles = checked_integers(triangles, "faces")
     if triangles.ndim != 2 or triangles.shape[1] != 3:
         raise ValueError(f"expected faces of shape (F, 3), got {triangles.shape}")
-    _check_range(triangles, len(points), "faces")
+    check_range(triangles, len(points), "faces")
     return points, triangles
-
-
-def checked_handles(
-    handles: ArrayLike, groups: ArrayLike | None, count: int
-) -> tuple[Ints, Ints, int]:
-    """Handles (H,), the group of each (H,), 0 to G - 1, and G; or a ValueError."""
-    chosen = _integers(handles, "handles")
-    if chosen.ndim != 1 or not len(chosen):
-        raise ValueError(f"expected handles of shape (H,), H > 0, got {chosen.shape}")
-    _check_range(chosen, count, "handles")
-    unique, times = np.unique(chosen, return_counts=True)
-    if len(unique) < len(chosen):
-        raise ValueError(f"vertex {unique[times > 1][0]} is a handle more than once")
-    if groups is None:
-        return chosen, np.zeros(len(chosen), dtype=np.int64), 1
-    labels = _integers(groups, "groups")
-    if labels.shape != chosen.shape:
-        raise ValueError(f"expected groups of shape {chosen.shape}, got {labels.shape}")
-    names, group_of = np.unique(labels, return_inverse=True)
-    return chosen, group_of.astype(np.int64), len(names)
 
 
 def checked_targets(targets: ArrayLike, count: int, frame: Frame) -> Floats:
@@ -106,36 +84,30 @@ def checked_targets(targets: ArrayLike, count: int, frame: Frame) -> Floats:
     return points
 
 
-def lay_out(points: Floats, faces: Ints, handles: Ints) -> Layout:
+def lay_out(points: Floats, faces: Ints) -> Layout:
     """The order in which the vertices at `points` (N, 3) are worked on."""
     count = len(points)
     tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     graph = sp.coo_matrix((np.ones(len(tails)), (tails, heads)), shape=(count, count)).tocsr()
     graph = sp.csr_matrix(graph + graph.T)
-    parts, part_of = connected_components(graph, directed=False)
-    touched = np.zeros(parts, dtype=bool)
-    touched[part_of[handles]] = True
-    is_free = touched[part_of]
-    is_free[handles] = False
-    free = np.flatnonzero(is_free)
-    tree = dissect(sp.csr_matrix(graph[free][:, free]), points[free])
-    free = free[tree.order]
-    carried = np.flatnonzero(~touched[part_of])
-    order = np.concatenate([free, handles, carried])
+    _, part_of = connected_components(graph, directed=False)
+    tree = dissect(graph, points)
+    order = tree.order.astype(np.int64)
     place = np.empty(count, dtype=np.int64)
     place[order] = np.arange(count)
-    kept = faces[touched[part_of[faces[:, 0]]]]
-    return Layout(order, len(free), len(free) + len(handles), place[kept], part_of[order], tree)
+    return Layout(order, place, place[faces], part_of[order], tree)
 
 
-def _integers(values: ArrayLike, name: str) -> Ints:
+def checked_integers(values: ArrayLike, name: str) -> Ints:
+    """An array of integers, or a ValueError that names it."""
     array = np.asarray(values)
     if array.size and not np.issubdtype(array.dtype, np.integer):
         raise ValueError(f"expected integer {name}, got {array.dtype}")
     return array.astype(np.int64)
 
 
-def _check_range(indices: Ints, count: int, name: str) -> None:
+def check_range(indices: Ints, count: int, name: str) -> None:
+    """Raise a ValueError if an index does not name one of `count` vertices."""
     if indices.size and (indices.min() < 0 or indices.max() >= count):
         bad = indices[(indices < 0) | (indices >= count)].ravel()[0]
         raise ValueError(f"{name} name vertex {bad}, but there are {count} vertices")

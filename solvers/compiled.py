@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import TypeVar, cast
 
 # Threads that wait for work must sleep, not spin: a performance shares its cores with the renderer
@@ -12,6 +13,9 @@ from typing import TypeVar, cast
 os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 import numba
+
+# Below this many vertices, waking a second thread takes longer than what it would do.
+_WORTH_SHARING = 4000
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
@@ -49,3 +53,22 @@ def parallel_kernel(function: _Function) -> _Function:
             boundscheck=False,
         )(function),
     )
+
+
+@contextmanager
+def threads_for(vertices: int) -> Iterator[None]:
+    """Run the kernels within on as many threads as so many vertices are worth."""
+    if vertices >= _WORTH_SHARING:
+        yield
+        return
+    before = numba.get_num_threads()
+    numba.set_num_threads(1)
+    try:
+        yield
+    finally:
+        numba.set_num_threads(before)
+
+
+def most_threads() -> int:
+    """How many threads a kernel may run on, so that each can have room of its own."""
+    return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]

@@ -10,11 +10,9 @@ not collapse. Deformation that starts there has only the bending left to find.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
 from numba import prange
 from numpy.typing import NDArray
 
@@ -39,39 +37,47 @@ def fit_motions(source: Floats, target: Floats, group_of: Ints, count: int) -> F
     """The rigid motions of `count` groups as dual quaternions (G, 8), scalars first.
 
     Each takes its points of `source` (H, 3) nearest to those of `target` (H, 3); `group_of` (H,)
-    says whose a point is. What a group leaves open (a point has no rotation, a line none about
-    itself) is settled by the motion of all points together, and what that leaves open by turning
-    as little as possible.
+    says whose a point is, -1 for nobody's. What a group leaves open (a point has no rotation, a
+    line none about itself, an empty group nothing at all) is settled by the motion of all points
+    together, and what that leaves open by turning as little as possible.
 
     Source: Kabsch 1976; Horn 1987.
     """
     nothing = np.eye(3).ravel()
     together = np.zeros_like(group_of)
-    overall = _rotations(_covariances(source, target, together, 1)[0], nothing)[0]
-    covariances, centres = _covariances(source, target, group_of, count)
+    covariance, centre = _covariances(source, target, together, np.zeros((1, 6)))
+    overall = _rotations(covariance, nothing)[0]
+    covariances, centres = _covariances(source, target, group_of, np.repeat(centre, count, axis=0))
     rotations = _rotations(covariances, overall)
     return _dual_quaternions(rotations, centres)
 
 
 @kernel
 def _covariances(
-    source: Floats, target: Floats, group_of: Ints, count: int
+    source: Floats, target: Floats, group_of: Ints, empty: Floats
 ) -> tuple[Floats, Floats]:
-    """Covariances (G, 9) of target with source, and their centres side by side (G, 6)."""
+    """Covariances (G, 9) of target with source, and their centres side by side (G, 6).
+
+    `empty` (G, 6) are the centres of groups without a point.
+    """
+    count = len(empty)
     sizes = np.zeros(count)
     centres = np.zeros((count, 6))
     for h in range(len(group_of)):
         g = group_of[h]
-        sizes[g] += 1.0
-        for axis in range(3):
-            centres[g, axis] += source[h, axis]
-            centres[g, 3 + axis] += target[h, axis]
+        if g >= 0:
+            sizes[g] += 1.0
+            for axis in range(3):
+                centres[g, axis] += source[h, axis]
+                centres[g, 3 + axis] += target[h, axis]
     for g in range(count):
         for axis in range(6):
-            centres[g, axis] /= sizes[g]
+            centres[g, axis] = centres[g, axis] / sizes[g] if sizes[g] > 0.0 else empty[g, axis]
     S = np.zeros((count, 9))
     for h in range(len(group_of)):
         g = group_of[h]
+        if g < 0:
+            continue
         for row in range(3):
             offset = target[h, row] - centres[g, 3 + row]
             for column in range(3):
@@ -191,55 +197,12 @@ def follow_one_group(group_of: Ints) -> Influences:
 
 
 def farthest_motion(motions: Floats, points: Floats, group_of: Ints) -> tuple[float, float]:
-    """The largest turn [rad] and the longest path of the groups' points (H, 3) under motions."""
-    turn = 2.0 * np.arctan2(np.linalg.norm(motions[:, 1:4], axis=1), np.abs(motions[:, 0]))
-    moved = np.empty_like(points)
-    follow(points, follow_one_group(group_of), motions, moved)
-    return float(turn.max()), float(np.linalg.norm(moved - points, axis=1).max())
+    """The largest turn [rad] and the longest path of the groups' points (H, 3) under motions.
 
-
-def harmonic_influences(
-    solve: Callable[[Floats, Floats], None],
-    coupling: sp.csr_matrix,
-    group_of: Ints,
-    count: int,
-) -> Influences:
-    """Smooth weights of `count` groups at the free vertices; the KEPT largest of each are kept.
-
-    Group g's weight is the harmonic function that is one at its handles and zero at the others',
-    L_ff w = -L_fh 1_g. `solve` puts the solution of L_ff x = b, both (free, 3), into its second
-    argument; `coupling` is -L_fh (free, H).
-
-    Source: Joshi et al. 2007, Harmonic coordinates for character articulation, section 3.
+    Points of nobody, whose `group_of` (H,) is -1, do not count.
     """
-    free = coupling.shape[0]
-    membership = sp.csr_matrix(
-        (np.ones(len(group_of)), (np.arange(len(group_of)), group_of)),
-        shape=(len(group_of), count + 2),
-    )
-    flows = sp.csc_matrix(coupling @ membership)  # (free, G), two empty columns to fill threes
-    groups = np.zeros((free, KEPT), dtype=np.uint32)
-    weights = np.zeros((free, KEPT))
-    solution = np.empty((free, 3))
-    for first in range(0, count, 3):
-        solve(np.ascontiguousarray(flows[:, first : first + 3].toarray()), solution)
-        _keep_largest(solution, first, groups, weights)
-    total = weights.sum(axis=1, keepdims=True)
-    weights[:, :1] += total == 0.0  # reached by no weight at all: follow the first group
-    return Influences(groups, weights / np.where(total == 0.0, 1.0, total))
-
-
-@kernel
-def _keep_largest(
-    solution: Floats, first: int, groups: NDArray[np.uint32], weights: Floats
-) -> None:
-    """Insert three more groups' weights into each row's list, largest first."""
-    for i in range(len(groups)):
-        for k in range(3):
-            w = solution[i, k]
-            if w > weights[i, KEPT - 1]:
-                slot = KEPT - 1
-                while slot > 0 and w > weights[i, slot - 1]:
-                    weights[i, slot], groups[i, slot] = weights[i, slot - 1], groups[i, slot - 1]
-                    slot -= 1
-                weights[i, slot], groups[i, slot] = w, first + k
+    turn = 2.0 * np.arctan2(np.linalg.norm(motions[:, 1:4], axis=1), np.abs(motions[:, 0]))
+    own = group_of >= 0
+    moved = np.empty((int(own.sum()), 3))
+    follow(points[own], follow_one_group(group_of[own]), motions, moved)
+    return float(turn.max()), float(np.linalg.norm(moved - points[own], axis=1).max(initial=0.0))

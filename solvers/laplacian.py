@@ -92,12 +92,15 @@ def cotangent_edges(vertices: Floats, faces: Ints) -> WeightedEdges:
 def graph_laplacian(edges: WeightedEdges, count: int) -> sp.csr_matrix:
     """The Laplacian (N, N) of weighted edges: symmetric, rows sum to zero, diagonal positive."""
     i, j = edges.pairs[:, 0], edges.pairs[:, 1]
-    adjacency = sp.coo_matrix(
-        (np.tile(edges.weights, 2), (np.concatenate([i, j]), np.concatenate([j, i]))),
+    tails, heads, weights = np.append(i, j), np.append(j, i), np.tile(edges.weights, 2)
+    every = np.arange(count)  # with its diagonal entry, a vertex without an edge too
+    return sp.coo_matrix(
+        (
+            np.concatenate([-weights, weighted_sums(tails, weights, count)]),
+            (np.concatenate([tails, every]), np.concatenate([heads, every])),
+        ),
         shape=(count, count),
     ).tocsr()
-    degree = np.asarray(adjacency.sum(axis=1)).ravel()
-    return sp.csr_matrix(sp.diags(degree) - adjacency)
 
 
 def cotangent_laplacian(vertices: Floats, faces: Ints) -> sp.csr_matrix:

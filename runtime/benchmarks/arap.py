@@ -8,7 +8,6 @@ from time import perf_counter
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 from numba import get_num_threads, prange
 from numpy.typing import NDArray
 
@@ -16,8 +15,9 @@ from solvers.arap import ArapSolver
 from solvers.arap_cells import SPOKES, build_cells
 from solvers.arap_kernels import fit_cells, residual
 from solvers.arap_layout import lay_out
-from solvers.block_factor import BlockFactor
-from solvers.compiled import parallel_kernel
+from solvers.compiled import most_threads, parallel_kernel
+from solvers.held_system import HeldSystem, Hold
+from solvers.rotation_fit import SCRATCH
 
 SIZES = (2_500, 10_000, 40_000, 160_000)
 REPEATS = 9
@@ -92,19 +92,21 @@ def _stages(
     vertices: Floats, faces: Ints, handles: Ints
 ) -> tuple[dict[str, Callable[[], object]], int]:
     """The three stages of an iteration by themselves, and the bytes that they cannot but move."""
-    layout = lay_out(vertices, faces, handles)
+    layout = lay_out(vertices, faces)
     x = vertices[layout.order].copy()
     mesh = build_cells(x, layout.faces, SPOKES)
-    free = layout.free
-    factor = BlockFactor(sp.csr_matrix(mesh.laplacian[:free, :free]), layout.tree)
-    R, laplace_x, b = np.empty((len(x), 9)), np.empty_like(x), np.zeros((free, 3))
+    held = Hold(np.zeros(len(x), dtype=np.bool_), np.zeros(len(x)))
+    held.fixed[layout.place[handles]] = True
+    system = HeldSystem(mesh.laplacian, layout.tree, held)
+    R, laplace_x, b = np.empty((len(x), 9)), np.empty_like(x), np.zeros_like(x)
+    room = np.empty((most_threads(), SCRATCH))
     arrays = mesh.cells.fits, mesh.cells.pulls, mesh.cells.own
     moved = sum(array.nbytes for array in arrays) + 2 * mesh.cells.neighbours.nbytes
-    moved += factor.nbytes + 2 * (R.nbytes + laplace_x.nbytes + b.nbytes) + 3 * x.nbytes
+    moved += system.nbytes + 2 * (R.nbytes + laplace_x.nbytes + b.nbytes) + 3 * x.nbytes
     return {
-        "local_ms": lambda: fit_cells(x, mesh.cells, R, laplace_x),
-        "rhs_ms": lambda: residual(R, laplace_x, mesh.cells, b),
-        "solve_ms": lambda: factor.add_solution(b, x),
+        "local_ms": lambda: fit_cells(x, mesh.cells, R, laplace_x, room),
+        "rhs_ms": lambda: residual(R, laplace_x, mesh.cells, held.fixed, b),
+        "solve_ms": lambda: system.add_solution(b, x),
     }, moved
 
 
