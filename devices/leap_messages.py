@@ -41,6 +41,16 @@ class LeapDecoder:
         """Both hands, or the one that was asked for."""
         return self._performer.skeleton
 
+    @property
+    def trouble(self) -> str:
+        """One line on why no frames come, as far as the server's events say; else an empty one."""
+        states = self.devices.values()
+        if not states or any(attached and streaming for attached, streaming in states):
+            return ""
+        if any(attached for attached, _ in states):
+            return "the Leap is plugged in but sees nothing; resume it in its control panel"
+        return "the Leap is not plugged in"
+
     def feed(self, data: bytes, arrival: float) -> Sequence[SkeletonFrame]:
         """The frame in a message that came at `arrival` [s]; none for a header or an event."""
         message = _message(data)
@@ -49,11 +59,6 @@ class LeapDecoder:
         if not (self._header(message) or self._event(message.get("event"))):
             self.refused += 1
         return []
-
-    def restart(self) -> None:
-        """Forget what the last connection said; a new one begins with its own header."""
-        self.version = None
-        self.devices.clear()
 
     def _frame(self, message: Mapping[str, Any], arrival: float) -> SkeletonFrame:
         found = leap_frame(message)
@@ -66,6 +71,7 @@ class LeapDecoder:
         if not isinstance(version, int) or isinstance(version, bool) or "event" in message:
             return False
         self.version = version
+        self.devices.clear()  # a new connection tells of them again
         return True
 
     def _event(self, event: Any) -> bool:
