@@ -16,6 +16,7 @@ from devices.skeleton import Skeleton, SkeletonFrame
 
 HOLD_SECONDS = 0.5
 EASE_SECONDS = 1.0
+MOST_PERFORMERS = 64  # that are remembered; a sensor may number people anew for ever
 FARTHEST = 100.0  # [m] from the origin; what claims to lie further was not seen
 
 Array = NDArray[np.float64]
@@ -69,32 +70,43 @@ class Filler:
         self._memories: dict[int, _Memory] = {}
 
     def fill(self, frame: SkeletonFrame) -> FilledFrame:
-        """The frame with every joint placed.
+        """The frame with every joint placed; see `place`."""
+        return self.place(frame.positions, frame.time, frame.performer)
+
+    def place(self, positions: Array, time: float, performer: int) -> FilledFrame:
+        """Place every joint.
+
+        Args:
+            positions: (J, 3) [m]; NaN where not seen.
+            time: [s].
+            performer: whose they are.
 
         Raises:
-            ValueError: the frame has not the skeleton's number of joints.
+            ValueError: it has not the skeleton's number of joints.
         """
-        if frame.positions.shape != self._rest.shape:
-            raise ValueError(f"Expected positions {self._rest.shape}, got {frame.positions.shape}")
-        near: NDArray[np.bool_] = np.abs(frame.positions) <= FARTHEST  # False for NaN
+        if positions.shape != self._rest.shape:
+            raise ValueError(f"Expected positions {self._rest.shape}, got {positions.shape}")
+        near: NDArray[np.bool_] = np.abs(positions) <= FARTHEST  # False for NaN
         seen = np.logical_and.reduce(near, axis=1)
-        memory = self._memory(frame)
-        self._measure(memory, frame.positions, seen)
-        positions = np.where(seen[:, None], frame.positions, 0.0)
+        memory = self._memory(performer, time)
+        self._measure(memory, positions, seen)
+        placed = np.where(seen[:, None], positions, 0.0)
         if not seen.all():
-            self._place(positions, seen, self._offsets(memory, frame.time), memory)
-        self._remember(memory, positions, seen, frame.time)
-        return FilledFrame(positions, ~seen)
+            self._place(placed, seen, self._offsets(memory, time), memory)
+        self._remember(memory, placed, seen, time)
+        return FilledFrame(placed, ~seen)
 
-    def _memory(self, frame: SkeletonFrame) -> _Memory:
-        if frame.performer not in self._memories:
+    def _memory(self, performer: int, time: float) -> _Memory:
+        if performer not in self._memories:
             count = len(self._rest)
             long_ago = np.full(count, -np.inf)
-            self._memories[frame.performer] = _Memory(
+            self._memories[performer] = _Memory(
                 self._rest.copy(), long_ago, np.zeros(count), np.zeros(count)
             )
-        memory = self._memories[frame.performer]
-        np.minimum(memory.seen_at, frame.time, out=memory.seen_at)  # a clock that went back
+            if len(self._memories) > MOST_PERFORMERS:
+                del self._memories[next(iter(self._memories))]
+        memory = self._memories[performer]
+        np.minimum(memory.seen_at, time, out=memory.seen_at)  # a clock that went back
         return memory
 
     def _measure(self, memory: _Memory, positions: Array, seen: NDArray[np.bool_]) -> None:

@@ -54,6 +54,13 @@ def counting(text: str) -> int:
     return value
 
 
+def whole(text: str) -> int:
+    """A whole number from 0."""
+    if not (text.isascii() and text.isdigit() and len(text) < 10):
+        raise argparse.ArgumentTypeError(f"expected a whole number from 0, got {text!r}")
+    return int(text)
+
+
 class _Parser(argparse.ArgumentParser):
     """Answers bad arguments with the one line that every command answers bad input with."""
 
@@ -74,6 +81,7 @@ def _add_show_options(parser: argparse.ArgumentParser) -> None:
     show.add_argument(
         "--plain", action="store_true", help="without the matched chains and the mirror"
     )
+    _add_conditioning(parser)
     match = parser.add_argument_group("who drives what")
     match.add_argument(
         "--source",
@@ -117,6 +125,26 @@ def _add_show_options(parser: argparse.ArgumentParser) -> None:
         metavar="OUT.{glb,usdc,usda,bvh}",
         help="the performed character, for other programs",
     )
+
+
+CONDITIONING = {
+    "order": "drop duplicates and late frames, go on where a clock jumps",
+    "identities": "know performers again under a new number",
+    "swaps": "put limbs right whose left and right are exchanged",
+    "outliers": "leave out joints that jump and bones that stretch",
+    "filter": "smooth (One-Euro); not on recordings by default",
+    "predict": "show where joints will be one frame later; off by default",
+    "level": "keep the floor level; not on recordings by default",
+    "mirror": "as in a mirror, left is right; off by default",
+    "scale": "make all performers the same size; not on recordings by default",
+    "recalibrate": "a T or A pose held for a second is the rest state; off by default",
+}
+
+
+def _add_conditioning(parser: argparse.ArgumentParser) -> None:
+    stream = parser.add_argument_group("what is done to the stream first")
+    for name, text in CONDITIONING.items():
+        stream.add_argument(f"--{name}", action=argparse.BooleanOptionalAction, help=text)
 
 
 def _characters(parser: argparse.ArgumentParser, *, required: bool) -> None:
@@ -176,6 +204,24 @@ def parser() -> argparse.ArgumentParser:
     record.add_argument("out", type=Path, metavar="OUT.mcap")
     record.add_argument("--seconds", type=positive, help="stop after this long")
 
+    bridge = add(
+        "bridge", _command("bridge", "bridge"), "a live stream goes to shows on other machines"
+    )
+    bridge.add_argument("--device", metavar="URL", help="as `bunraku devices` lists")
+    bridge.add_argument(
+        "--bind",
+        default="tcp://127.0.0.1:5570",
+        metavar="tcp://HOST:PORT",
+        help="where shows find it, as zmq+tcp://HOST:PORT (default tcp://127.0.0.1:5570)",
+    )
+    bridge.add_argument(
+        "--keys", type=Path, metavar="DIR", help="of this machine; needed beyond it"
+    )
+    bridge.add_argument(
+        "--make-keys", type=Path, metavar="DIR", help="write keys for both machines, and end"
+    )
+    bridge.add_argument("--seconds", type=positive, help="stop after this long")
+
     add(
         "devices",
         _command("info", "devices_there"),
@@ -183,6 +229,19 @@ def parser() -> argparse.ArgumentParser:
     )
     info = add("info", _command("info", "info"), "what is in a recording or a character's file")
     info.add_argument("file", metavar="FILE")
+    convert = add(
+        "convert", _command("convert", "convert"), "a recording becomes a file of another kind"
+    )
+    convert.add_argument("recording", type=Path, metavar="IN", help="any recording that is read")
+    convert.add_argument("out", type=Path, metavar="OUT.{mcap,bvh,csv}")
+    convert.add_argument("--performer", type=whole, metavar="N", help="of several, only this one")
+    convert.add_argument(
+        "--unit", choices=("cm", "m", "mm", "in"), help="of a BVH file (default cm)"
+    )
+    convert.add_argument(
+        "--rate", type=positive, metavar="HZ", help="of a BVH file (default: the recording's)"
+    )
+    convert.add_argument("--force", action="store_true", help="replace OUT if it is there")
     doctor = add("doctor", _command("doctor", "doctor"), "what is wrong with this machine")
     doctor.add_argument("--warm", action="store_true", help="compile the solvers ahead of time")
     bench = add("bench", _command("bench", "bench"), "how fast it is here")

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from devices.stream import SkeletonStream
 from replay.player import Player
+from runtime.conditioning.switches import Conditioning, filled_only
 from runtime.director import Director
 from runtime.theatre import Theatre
 from runtime.window import Event, KeyPressed, Resized, Window
@@ -19,7 +20,28 @@ KEYS = {
     "home": "back to the start (a recording)",
     "f": "frame every character",
     "h": "show or hide the matched chains",
+    "c": "calibrate: the pose is the rest state, floor and sizes are measured anew",
+    "x": "mirror, on or off",
+    "s": "smoothing, on or off",
+    "p": "prediction, on or off",
+    "o": "the gate for outliers, on or off",
+    "w": "putting swapped limbs right, on or off",
+    "i": "steady identities, on or off",
+    "l": "levelling the floor, on or off",
+    "z": "one size for all performers, on or off",
+    "k": "calibrating by a T or A pose that is held, on or off",
     "escape": "leave",
+}
+SWITCH_OF_KEY = {
+    "x": "mirror",
+    "s": "filter",
+    "p": "predict",
+    "o": "outliers",
+    "w": "swaps",
+    "i": "identities",
+    "l": "level",
+    "z": "scale",
+    "k": "recalibrate",
 }
 
 
@@ -31,13 +53,19 @@ class Controls:
     """
 
     def __init__(
-        self, window: Window, theatre: Theatre, director: Director, stream: SkeletonStream
+        self,
+        window: Window,
+        theatre: Theatre,
+        director: Director,
+        stream: SkeletonStream,
+        conditioning: Conditioning | None = None,
     ) -> None:
         self.leaving = False
         self._window = window
         self._theatre = theatre
         self._director = director
         self._stream = stream
+        self._conditioning = conditioning or filled_only()
         window.camera = theatre.camera
 
     def serve(self) -> None:
@@ -72,6 +100,10 @@ class Controls:
             self._window.camera = self._theatre.camera
         elif key == "h":
             self._theatre.highlights = not self._theatre.highlights
+        elif key == "c":
+            self._director.calibrate()
+        elif key in SWITCH_OF_KEY:
+            self._conditioning.switch(SWITCH_OF_KEY[key])
         elif key == "escape":
             self.leaving = True
         elif isinstance(self._stream, Player):

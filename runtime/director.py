@@ -78,6 +78,7 @@ class Director:
         self._shown = [MatchHysteresis(choices.rank - 1) for _ in puppets]
         self._source = simplify(performer.rest_tree())
         self._since = float("nan")
+        self._before: Pose | None = None
 
     def sees(self, frame: SkeletonFrame) -> bool:
         """Whether enough of the driving joints are in view to strike a pose."""
@@ -113,6 +114,8 @@ class Director:
     def direct(self, frame: SkeletonFrame) -> None:
         """While matching, show the best match of the newest pose; accept it in time."""
         pose = self._performer.pose
+        if pose is not None:
+            self._turn_over(pose)
         if not self.matching or pose is None:
             return
         if not self.sees(frame):
@@ -176,6 +179,28 @@ class Director:
             body = self._body(puppet, puppet.mapping, rest)
             puppet.take(puppet.mapping, rest, self._view(), body)
         self.matching = False
+
+    def calibrate(self) -> None:
+        """Take the pose just struck as the rest state, and measure floor and sizes anew."""
+        self._performer.recalibrate()
+        self.accept()
+
+    def _turn_over(self, pose: Pose) -> None:
+        """Where the mirror or the scale was switched, let the rest states follow."""
+        before, self._before = self._before, pose
+        if before is None or (before.mirrored, before.scaled) == (pose.mirrored, pose.scaled):
+            return
+        mirror = before.mirrored != pose.mirrored
+        ratio = pose.scale / before.scale if before.scaled != pose.scaled else 1.0
+        for puppet in self._puppets:
+            rest = puppet.source_rest
+            if rest is None:
+                continue
+            rest = self._performer.restated(rest, mirror=mirror, scale=ratio)
+            gains = puppet.gains
+            body = self._body(puppet, puppet.mapping, rest)
+            puppet.take(puppet.mapping, rest, self._view(), body)
+            puppet.gains = gains
 
     def match_again(self) -> None:
         """Return to matching, by the pose alone, whatever was stepped to by hand."""

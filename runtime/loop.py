@@ -13,6 +13,8 @@ from typing import Protocol
 from devices.skeleton import SkeletonFrame
 from devices.stream import SkeletonStream
 from runtime.clock import StageTimer
+from runtime.conditioning.reception import Reception
+from runtime.conditioning.switches import Conditioning, filled_only
 from runtime.director import Director
 from runtime.lead import Lead
 from runtime.output.output import Output, PerformedFrame
@@ -43,7 +45,8 @@ class FrameLoop:
         report: what the show is told by.
         theatre: where it is shown, or None when nobody looks and no output needs a picture.
         outputs: for each puppet, what keeps its performance.
-        recorder: what keeps the performer's frames, or None.
+        conditioning: how the stream is put in order; as it comes where None.
+        recorder: what keeps the performer's frames as they come, or None.
         shown: whether somebody looks, so that every tick is drawn.
 
     Attributes:
@@ -61,6 +64,7 @@ class FrameLoop:
         report: Report,
         theatre: Theatre | None,
         outputs: Sequence[Sequence[Output]],
+        conditioning: Conditioning | None = None,
         recorder: Recorder | None = None,
         shown: bool = False,
     ) -> None:
@@ -79,6 +83,7 @@ class FrameLoop:
         rate = max((o.pictures_a_second for kept in outputs for o in kept), default=0.0)
         self._picture_step = EARLY / rate if rate > 0.0 else math.inf  # [s]
         self._pictured = -math.inf
+        self._reception = Reception(stream.skeleton, conditioning or filled_only())
         self._lead = Lead()
         self._timer = StageTimer()
         self._pose: Pose | None = None
@@ -104,13 +109,14 @@ class FrameLoop:
         return newest is not None
 
     def _receive(self) -> tuple[SkeletonFrame | None, bool]:
-        """The lead's newest frame, else anyone's; the recorder gets every one."""
-        frames = self._stream.poll()
+        """The lead's newest frame, else anyone's; the recorder gets every one, as it came."""
+        came = self._stream.poll()
         if self._recorder is not None:
-            for frame in frames:
+            for frame in came:
                 self._recorder.write(frame)
+        frames = self._reception.receive(came)
         leading = [frame for frame in frames if self._lead.leads(frame)]
-        self._report.dropped += max(len(frames) - 1, 0)
+        self._report.dropped += len(came) - min(len(frames), 1)
         if leading:
             return leading[-1], True
         return (frames[-1] if frames else None), False
@@ -120,6 +126,8 @@ class FrameLoop:
         if leads:
             with timer.stage("match"):
                 self._pose = self._performer.follow(frame)
+                if self._performer.calibrates:
+                    self._director.calibrate()
                 self._director.direct(frame)
         motions = []
         for puppet in self._puppets:

@@ -17,7 +17,9 @@ from devices.anatomy import (
 )
 from devices.joint_names import Kind
 from devices.skeleton import Skeleton, SkeletonFrame
-from replay.fill import Filler
+from runtime.conditioning.conditioner import Conditioner
+from runtime.conditioning.mirror import mirrored
+from runtime.conditioning.switches import Conditioning, filled_only
 from solvers.heading import heading, turned
 from solvers.tree import Tree
 
@@ -32,17 +34,28 @@ class Pose:
 
     Attributes:
         seen: (J, 3) [m] every joint, never NaN.
-        filled: (J,) bool, joints that were not seen but filled in.
+        filled: (J,) bool, joints that were not seen, or not believed, but filled in.
+        corrected: (J,) bool, joints that were seen elsewhere: not believed, or called their
+            partner's name.
+        predicted: (J,) bool, joints that are where they will be one frame later.
         heading: [rad] about +Y, how far the whole body has turned from facing +Z.
         hips: (3,) [m] where the hips are; the body turns about them.
         sole: [m] how far the lowest joint is above the floor as one stands.
+        mirrored: whether left is right.
+        scaled: whether lengths were made those of the skeleton's rest pose.
+        scale: what they were multiplied by.
     """
 
     seen: Array
     filled: NDArray[np.bool_]
+    corrected: NDArray[np.bool_]
+    predicted: NDArray[np.bool_]
     heading: float
     hips: Array
     sole: float
+    mirrored: bool = False
+    scaled: bool = False
+    scale: float = 1.0
 
     def facing(self, heading: float) -> Array:
         """Every joint (J, 3) [m], the whole body turned so that it has this heading [rad]."""
@@ -74,6 +87,11 @@ def rest_state(pose: Pose, heading: float | None = None) -> Rest:
 class Performer:
     """Follows one performer from frame to frame.
 
+    Args:
+        skeleton: the performer's whole skeleton.
+        source: the part that drives.
+        conditioning: what is done to the frames first; only filled where None.
+
     Attributes:
         skeleton: the performer's whole skeleton.
         joints: the joints that may drive a character, as chosen by `source`.
@@ -84,7 +102,12 @@ class Performer:
         InputError: `source` names a part or joints that this skeleton does not have.
     """
 
-    def __init__(self, skeleton: Skeleton, source: str = "whole") -> None:
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        source: str = "whole",
+        conditioning: Conditioning | None = None,
+    ) -> None:
         self.skeleton = skeleton
         self._parents, self.joints = source_tree(skeleton, source_joints(skeleton, source))
         there = available_presets(skeleton)
@@ -96,18 +119,46 @@ class Performer:
         self._pairs = np.array(heading_joints(skeleton), dtype=np.int64).reshape(-1, 2)
         self._hips = hips_joint(skeleton)
         self._parts = label_joints(skeleton)
-        self._filler = Filler(skeleton)
+        self._conditioner = Conditioner(skeleton, conditioning or filled_only())
         self._sole = float(np.clip(skeleton.rest_positions[:, 1].min(), 0.0, HIGHEST_SOLE))
         self._heading = 0.0
         self.pose: Pose | None = None
 
     def follow(self, frame: SkeletonFrame) -> Pose:
         """Take in one frame; its pose is the newest."""
-        filled = self._filler.fill(frame)
-        positions = filled.positions
+        whole = self._conditioner.condition(frame)
+        positions = whole.positions
         self._heading = heading(positions, self._pairs, self._heading)
-        self.pose = Pose(positions, filled.filled, self._heading, positions[self._hips], self._sole)
+        self.pose = Pose(
+            seen=positions,
+            filled=whole.filled,
+            corrected=whole.corrected,
+            predicted=whole.predicted,
+            heading=self._heading,
+            hips=positions[self._hips],
+            sole=self._sole,
+            mirrored=whole.mirrored,
+            scaled=whole.scaled,
+            scale=whole.scale,
+        )
         return self.pose
+
+    @property
+    def calibrates(self) -> bool:
+        """Whether the newest pose is a T or A that has been held, to be the rest state."""
+        return self._conditioner.held
+
+    def recalibrate(self) -> None:
+        """Measure the floor and the performers' sizes anew."""
+        self._conditioner.recalibrate()
+
+    def restated(self, rest: Rest, *, mirror: bool, scale: float) -> Rest:
+        """A rest state as it would have been: mirrored, and `scale` times as large."""
+        positions = rest.positions * scale
+        if mirror:
+            positions = mirrored(positions, self._conditioner.partner)
+        heading = -rest.heading if mirror else rest.heading
+        return Rest(positions, heading, rest.height * scale)
 
     def limb(self, chain: tuple[int, ...]) -> tuple[int, ...]:
         """Give an arm or a leg without the bone that joins it to the trunk, two joints at least."""

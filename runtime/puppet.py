@@ -246,6 +246,11 @@ class Puppet:
         self._turn = self._lift = 0.0
         self._shift = np.zeros(3)
 
+    @property
+    def source_rest(self) -> Rest | None:
+        """The performer's rest state; None while nobody drives."""
+        return self._source_rest
+
     def follow(self, pose: Pose) -> None:
         """Take over the performer's pose."""
         if self._source_rest is None:

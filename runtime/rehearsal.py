@@ -6,15 +6,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.recording import Recording
+from runtime.conditioning.switches import Conditioning
 from runtime.director import Director
 from runtime.performer import Performer
 
 Array = NDArray[np.float64]
 
 POSES = 500  # looked at, evenly through the recording
+LED_THERE = 8  # frames that are followed up to each of them
 
 
-def rehearse(recording: Recording, source: str, director: Director) -> Array | None:
+def rehearse(
+    recording: Recording,
+    source: str,
+    director: Director,
+    conditioning: Conditioning | None = None,
+) -> Array | None:
     """Let the director choose matches and rest states from poses of the whole recording.
 
     Where hardly a joint is ever in view nothing is chosen; the director then matches as it would
@@ -24,18 +31,26 @@ def rehearse(recording: Recording, source: str, director: Director) -> Array | N
         recording: what will be played.
         source: the part of the performer that drives, as for `Performer`.
         director: who chooses.
+        conditioning: what is done to the frames first, as for `Performer`, so that no glitch of
+            the sensor is taken for a pose.
 
     Returns:
         (A, 2, 3) [m] for each puppet the corners of all that it fills, for the camera; None when
         nothing was chosen.
     """
     lead = np.flatnonzero(recording.performers == recording.performers[0])
-    chosen = np.unique(lead[np.linspace(0, len(lead) - 1, POSES).round().astype(int)])
-    performer = Performer(recording.skeleton, source)
+    chosen = np.unique(np.linspace(0, len(lead) - 1, POSES).round().astype(int))
+    performer = Performer(recording.skeleton, source, conditioning)
     poses = []
-    for index in chosen.tolist():
-        frame = recording.frame(index)
+    for index in _with_what_leads_there(chosen).tolist():
+        frame = recording.frame(int(lead[index]))
         pose = performer.follow(frame)
-        if director.sees(frame):
+        if index in chosen and director.sees(frame):
             poses.append(pose)
     return director.rehearse(poses) if poses else None
+
+
+def _with_what_leads_there(chosen: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Frames and those before them, by which a glitch is told from a pose."""
+    led = (chosen[:, None] - np.arange(LED_THERE)).ravel()
+    return np.unique(led[led >= 0])

@@ -21,6 +21,7 @@ from runtime.cast import character_named
 from runtime.characters.builtin import BUILTIN
 from runtime.clock import Ticker
 from runtime.commands.outputs import check_outputs, open_outputs
+from runtime.conditioning.switches import asked_for, for_live, for_recording
 from runtime.controls import Controls
 from runtime.director import Choices, Director
 from runtime.interrupt import held
@@ -114,7 +115,9 @@ class _Show:
         self._source = source
         self._closing = closing
         self._stream = closing.enter_context(RecordedStream(source.stream))
-        self._performer = Performer(self._stream.skeleton, options.source)
+        usual = for_live() if source.recording is None else for_recording()
+        self._conditioning = asked_for(usual, vars(options))
+        self._performer = Performer(self._stream.skeleton, options.source, self._conditioning)
         characters = [character_named(name) for name in options.character]
         self._report = Report(options.report)
         self._parts = [self._report.cast(character) for character in characters]
@@ -129,7 +132,7 @@ class _Show:
         """Perform until the stream ends or the window is closed."""
         options, recording = self._options, self._source.recording
         if recording is not None:
-            filled = rehearse(recording, options.source, self._director)
+            filled = rehearse(recording, options.source, self._director, self._conditioning)
             if self._theatre is not None:
                 self._theatre.frame_all(filled)
         with held():
@@ -139,7 +142,9 @@ class _Show:
         controls = None
         if self._window is not None and self._theatre is not None:
             played = self._source.stream
-            controls = Controls(self._window, self._theatre, self._director, played)
+            controls = Controls(
+                self._window, self._theatre, self._director, played, self._conditioning
+            )
         ticker = None if options.fast else Ticker(TICKS)
         while not self._stream.ended and not (controls is not None and controls.leaving):
             with held():  # so that all outputs have the same frames
@@ -167,6 +172,7 @@ class _Show:
             report=self._report,
             theatre=self._theatre,
             outputs=open_outputs(self._options, cast, self._source.rate, self._closing),
+            conditioning=self._conditioning,
             shown=self._window is not None,
         )
         self._closing.callback(self._tell, loop)

@@ -13,7 +13,8 @@ from devices.errors import InputError
 from devices.simulator import Simulator
 from devices.stream import open_stream
 from replay.player import EveryFrame, Player
-from runtime.controls import KEYS, Controls, key_help
+from runtime.conditioning.switches import SWITCHES, Conditioning
+from runtime.controls import KEYS, SWITCH_OF_KEY, Controls, key_help
 from runtime.director import Choices, Director
 from runtime.mapping import Mapping
 from runtime.performer import Performer
@@ -62,7 +63,8 @@ class Show:
         )
         self.theatre = Theatre(context, SIZE, [puppet], BODY)
         self.framed = self.theatre.camera
-        self.controls = Controls(self.desk, self.theatre, self.director, stream)
+        self.switches = Conditioning()
+        self.controls = Controls(self.desk, self.theatre, self.director, stream, self.switches)
 
     def press(self, *keys: str) -> None:
         self.desk.events.extend(KeyPressed(key) for key in keys)
@@ -99,7 +101,7 @@ def show(context: moderngl.Context, puppet: Puppet) -> Iterator[Show]:
 
 def test_every_key_in_the_list_is_tried_here() -> None:
     tried = {"m", "enter", "right", "left", "space", "home", "f", "h", "escape"}
-    assert set(KEYS) == tried
+    assert set(KEYS) == tried | {"c"} | set(SWITCH_OF_KEY)
     for line, (key, text) in zip(key_help(), KEYS.items(), strict=True):
         assert line.split() == [key, *text.split()]
     assert (
@@ -175,6 +177,31 @@ def test_h_hides_and_shows_the_chains(show: Show) -> None:
     assert not show.theatre.highlights
     show.press("h")
     assert show.theatre.highlights
+
+
+def test_each_step_of_the_conditioning_has_a_key(show: Show) -> None:
+    assert set(SWITCH_OF_KEY.values()) == set(SWITCHES) - {"order"}
+    for key, name in SWITCH_OF_KEY.items():
+        before = {each: getattr(show.switches, each) for each in SWITCHES}
+        show.press(key)
+        after = {each: getattr(show.switches, each) for each in SWITCHES}
+        assert after == before | {name: not before[name]}
+        show.press(key)
+        assert before == {each: getattr(show.switches, each) for each in SWITCHES}
+
+
+def test_c_takes_the_pose_as_the_rest_state(show: Show) -> None:
+    show.strike()
+    show.press("enter", "c")
+    bent = pose({"ElbowLeft": (0.0, 0.0, 1.2)})
+    show.performer.follow(frame(bent, 0.1))
+    show.puppet.follow(show.performer.pose)
+    assert np.abs(show.puppet.deform().vertices - show.puppet.character.vertices).max() > 0.1
+    show.press("c")
+    show.puppet.follow(show.performer.pose)
+    np.testing.assert_allclose(
+        show.puppet.deform().vertices, show.puppet.character.vertices, atol=1e-6
+    )
 
 
 def test_escape_and_the_closed_window_end_the_show(show: Show) -> None:
