@@ -1,4 +1,4 @@
-"""Open Sound Control 1.0: messages and bundles, read strictly and within bounds.
+"""Open Sound Control 1.0: messages and bundles, read strictly and within bounds, and written.
 
 Source: the OSC 1.0 specification (Wright 2002), and what its 1.1 successor made required of the
 type tags. python-osc is not used to read: a bundle element of negative size hangs it, a future
@@ -8,7 +8,7 @@ time tag makes it sleep, and it fills in arguments that are missing.
 from __future__ import annotations
 
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import lru_cache
 
@@ -145,3 +145,43 @@ def _blob(data: bytes, start: int, end: int) -> tuple[bytes, int]:
     if size < 0 or after > end:
         raise OscError(f"a blob claims {size} of {end - start - 4} bytes")
     return data[start + 4 : start + 4 + size], after
+
+
+def write_message(address: str, tags: str = "", *arguments: float | str) -> bytes:
+    """One message with the arguments that its type tags (of i, f, s, h, d) say.
+
+    Raises:
+        OscError: a type tag is none of these.
+    """
+    data = [_padded(address), _padded("," + tags)]
+    for tag, argument in zip(tags, arguments, strict=True):
+        if tag == "s":
+            data.append(_padded(str(argument)))
+        elif tag in _NUMBERS:
+            data.append(struct.pack(">" + _NUMBERS[tag], argument))
+        else:
+            raise OscError(f"the type tag {tag!r} cannot be written")
+    return b"".join(data)
+
+
+def write_bundles(messages: Iterable[bytes], longest: int) -> Iterator[bytes]:
+    """The messages in order, as few bundles as hold them with `longest` bytes at most in each.
+
+    A message that is longer by itself gets a bundle of its own.
+    """
+    head = BUNDLE + struct.pack(">Q", 1)  # time tag: at once
+    bundle = [head]
+    size = len(head)
+    for message in messages:
+        if len(bundle) > 1 and size + 4 + len(message) > longest:
+            yield b"".join(bundle)
+            bundle, size = [head], len(head)
+        bundle += (struct.pack(">i", len(message)), message)
+        size += 4 + len(message)
+    if len(bundle) > 1:
+        yield b"".join(bundle)
+
+
+def _padded(text: str) -> bytes:
+    data = text.encode("utf-8")
+    return data + bytes(4 - len(data) % 4)
