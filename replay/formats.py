@@ -8,6 +8,7 @@ from pathlib import Path
 
 from devices.errors import InputError
 from replay.bvh import read_bvh, recognises_bvh
+from replay.joint_table import read_joint_table, recognises_joint_table
 from replay.kinect_azure_csv import read_azure_csv, recognises_azure_csv
 from replay.kinect_laban import read_laban, recognises_laban
 from replay.kinect_msr import read_msr, recognises_msr
@@ -40,6 +41,7 @@ def formats() -> tuple[Format, ...]:
     """Every kind of recording that can be opened, the most certain to recognise first."""
     return (
         Format("Bunraku recording (MCAP)", recognises_mcap, read_mcap),
+        Format("Bunraku table (CSV)", recognises_joint_table, read_joint_table),
         Format("Leap Motion messages", recognises_leap, read_leap),
         Format("MediaPipe landmarks", recognises_mediapipe, read_mediapipe),
         Format("Azure Kinect joints (CSV)", recognises_azure_csv, read_azure_csv),

@@ -1,0 +1,65 @@
+"""Motion at even times, for formats that have one time step for all frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_LENGTHEN = 16  # a gappy recording may become so many times as many frames, at most
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class EvenTimes:
+    """Where even times lie among given ones.
+
+    Attributes:
+        step: between two even times [s].
+        after: (N,) the given time at or after each even one.
+        share: (N,) in [0, 1]: how far each is on the way there from the given time before.
+    """
+
+    step: float
+    after: NDArray[np.int64]
+    share: Array
+
+    def vectors(self, values: Array) -> Array:
+        """Values (T, ...) at the even times (N, ...), linearly."""
+        weight = self.share.reshape(-1, *[1] * (values.ndim - 1))
+        blended: Array = (1 - weight) * values[self.after - 1] + weight * values[self.after]
+        return blended
+
+    def rotations(self, quaternions: Array) -> Array:
+        """Unit quaternions (T, ..., 4) at the even times, linearly on the shorter arc and
+        normalised."""
+        before, after = quaternions[self.after - 1], quaternions[self.after]
+        opposite = np.sum(before * after, axis=-1, keepdims=True) < 0
+        weight = self.share.reshape(-1, *[1] * (quaternions.ndim - 1))
+        blended = (1 - weight) * before + weight * np.where(opposite, -after, after)
+        blended /= np.maximum(np.linalg.norm(blended, axis=-1, keepdims=True), 1e-12)
+        return blended
+
+
+def even_times(times: Array, rate: float | None = None) -> EvenTimes | None:
+    """Even times from the first to the last of `times` (T,) [s], which rise; None for fewer than 2.
+
+    Args:
+        times: of the frames.
+        rate: frames a second; by default that of the median step. A recording with gaps gets no
+            more than 16 times its frames.
+    """
+    if len(times) < 2:
+        return None
+    span = float(times[-1] - times[0])
+    wanted = float(np.median(np.diff(times))) if rate is None else 1.0 / rate
+    step = max(wanted, span / (_LENGTHEN * len(times)))
+    # The last frame is kept by an ever so slightly other step, unless somebody names the rate.
+    count = max(round(span / step), 1) if rate is None else max(int(span / step + 1e-6), 1)
+    step = span / count if rate is None else step
+    even = times[0] + np.minimum(step * np.arange(count + 1), span)
+    after = np.clip(np.searchsorted(times, even), 1, len(times) - 1)
+    share = (even - times[after - 1]) / (times[after] - times[after - 1])
+    return EvenTimes(step, after, share)

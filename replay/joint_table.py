@@ -1,0 +1,120 @@
+"""Recordings as tables for spreadsheets and scripts, which can be read back: CSV.
+
+The first line is a comment with the skeleton as JSON, the second names the columns: ``performer``,
+``time`` and ``arrival`` [s]; for each joint ``x``, ``y``, ``z`` [m] and ``confidence``; where there
+are rotations also ``qx``, ``qy``, ``qz``, ``qw``, joint to world. A row a frame; what is not known
+is ``nan``. Numbers have all their digits, so that a recording reads back bit for bit.
+"""
+
+from __future__ import annotations
+
+import csv
+import warnings
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from devices.errors import InputError
+from devices.skeleton import Skeleton
+from replay.mcap_file import decode_skeleton, encode_skeleton
+from replay.recording import Recording
+
+Array = NDArray[np.float64]
+
+MARK = "# bunraku.skeleton "
+MOST_BYTES = 1 << 30
+_PLACE = ("x", "y", "z", "confidence")
+_TURN = ("qx", "qy", "qz", "qw")
+
+
+def write_joint_table(file: TextIO, recording: Recording) -> None:
+    """Write every frame of a recording.
+
+    Args:
+        file: open for writing, without translation of line ends.
+        recording: of any number of performers.
+    """
+    names = recording.skeleton.names
+    per_joint = _PLACE if recording.rotations is None else _PLACE + _TURN
+    file.write(f"{MARK}{encode_skeleton(recording.skeleton)}\n")
+    table = csv.writer(file, lineterminator="\n")
+    table.writerow(
+        [
+            "performer",
+            "time",
+            "arrival",
+            *(f"{name}.{part}" for name in names for part in per_joint),
+        ]
+    )
+    joints = [recording.positions, recording.confidence[..., None]]
+    if recording.rotations is not None:
+        joints.append(recording.rotations)
+    for index, performer in enumerate(recording.performers.tolist()):
+        row = np.concatenate([values[index] for values in joints], axis=1).ravel()
+        clocks = [float(recording.times[index]), float(recording.arrivals[index])]
+        table.writerow([performer, *clocks, *row.tolist()])
+
+
+def recognises_joint_table(path: Path, head: bytes) -> bool:
+    """Whether a file begins as `write_joint_table` begins one."""
+    return head.removeprefix(b"\xef\xbb\xbf").startswith(MARK.encode())
+
+
+def read_joint_table(path: Path) -> Recording:
+    """The recording of `write_joint_table`, in the order of its times, which start at 0.
+
+    Raises:
+        InputError: the file cannot be read, its skeleton is damaged, or a row does not fit it.
+    """
+    skeleton, rows = _parsed(path)
+    joints = len(skeleton.names)
+    per_joint, left = divmod(rows.shape[1] - 3, joints)
+    if left or per_joint not in (4, 8):
+        raise InputError(
+            f"{path}: a row has {rows.shape[1]} columns; 3 and 4 or 8 for each of its {joints} "
+            "joints were expected"
+        )
+    if not np.isfinite(rows[:, :2]).all():
+        raise InputError(f"{path}: a row has no performer or no time")
+    rows = rows[np.argsort(rows[:, 1], kind="stable")]
+    cells = rows[:, 3:].reshape(len(rows), joints, per_joint)
+    cells[~np.isfinite(cells)] = np.nan
+    positions, confidence = cells[..., :3], np.clip(np.nan_to_num(cells[..., 3]), 0.0, 1.0)
+    unseen = np.isnan(positions).any(axis=2)
+    positions[unseen] = np.nan
+    confidence[unseen] = 0.0
+    arrivals = np.where(np.isfinite(rows[:, 2]), rows[:, 2], np.nan)
+    return Recording(
+        skeleton=skeleton,
+        times=rows[:, 1] - rows[0, 1],
+        positions=positions,
+        rotations=cells[..., 4:] if per_joint == 8 else None,
+        confidence=confidence,
+        performers=np.clip(rows[:, 0], 0, (1 << 31) - 1).astype(np.int64),
+        arrivals=arrivals - rows[0, 1],
+    )
+
+
+def _parsed(path: Path) -> tuple[Skeleton, Array]:
+    try:
+        if path.stat().st_size > MOST_BYTES:
+            raise InputError(f"{path}: larger than {MOST_BYTES >> 20} MiB; split the recording")
+        with path.open(encoding="utf-8-sig", errors="replace") as file:
+            skeleton = decode_skeleton(file.readline().removeprefix(MARK))
+            file.readline()
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # no row: said below
+                rows = np.loadtxt(file, delimiter=",", ndmin=2)
+    except OSError as error:
+        raise InputError(f"cannot read {path}: {error.strerror or error}") from error
+    except InputError as error:
+        raise InputError(
+            f"{path}: {error}" if str(path) not in str(error) else str(error)
+        ) from error
+    except ValueError as error:
+        raise InputError(f"{path}: not a table of numbers: {error}") from error
+    if not len(rows):
+        raise InputError(f"{path} holds a skeleton but no frame")
+    return skeleton, rows
