@@ -61,6 +61,15 @@ def whole(text: str) -> int:
     return int(text)
 
 
+def host_port(text: str) -> tuple[str, int | None]:
+    """A host and a port from ``HOST:PORT``; None where there is no port."""
+    host, colon, port = text.rpartition(":") if text.count(":") == 1 else (text, "", "")
+    host = host.removeprefix("[").removesuffix("]")
+    if not host or (colon and not (port.isdecimal() and 1 <= int(port) <= 65535)):
+        raise argparse.ArgumentTypeError(f"expected HOST:PORT, as in 127.0.0.1:39539, got {text!r}")
+    return host, int(port) if colon else None
+
+
 class _Parser(argparse.ArgumentParser):
     """Answers bad arguments with the one line that every command answers bad input with."""
 
@@ -124,6 +133,12 @@ def _add_show_options(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="OUT.{glb,usdc,usda,bvh}",
         help="the performed character, for other programs",
+    )
+    keep.add_argument(
+        "--vmc",
+        type=host_port,
+        metavar="HOST:PORT",
+        help="send the performer as VMC; its receivers listen on port 39539",
     )
 
 

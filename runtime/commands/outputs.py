@@ -17,7 +17,10 @@ from runtime.output.output import Output
 from runtime.output.point_cache import PointCache
 from runtime.output.report import Part
 from runtime.output.video import Video, encoder_for
+from runtime.output.vmc_performer import PORT as VMC_PORT
+from runtime.output.vmc_performer import VmcPerformer
 from runtime.output.whole_file import check_suffix, check_writable
+from runtime.performer import Performer
 
 
 def check_outputs(options: argparse.Namespace) -> None:
@@ -45,6 +48,7 @@ def check_outputs(options: argparse.Namespace) -> None:
 def open_outputs(
     options: argparse.Namespace,
     cast: Sequence[tuple[Character, Part]],
+    performer: Performer,
     rate: float,
     closing: ExitStack,
 ) -> list[list[Output]]:
@@ -53,6 +57,7 @@ def open_outputs(
     Args:
         options: of the command line.
         cast: the characters, each with its part of the report.
+        performer: who drives them.
         rate: about how many frames a second will come.
         closing: closes what was opened.
 
@@ -75,6 +80,9 @@ def open_outputs(
         outputs[0].append(closing.enter_context(video))
     if options.frames is not None:
         outputs[0].append(closing.enter_context(Frames(options.frames)))
+    if options.vmc is not None:
+        host, port = options.vmc
+        outputs[0].append(closing.enter_context(VmcPerformer(performer, host, port or VMC_PORT)))
     return outputs
 
 

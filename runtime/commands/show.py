@@ -171,7 +171,9 @@ class _Show:
             director=self._director,
             report=self._report,
             theatre=self._theatre,
-            outputs=open_outputs(self._options, cast, self._source.rate, self._closing),
+            outputs=open_outputs(
+                self._options, cast, self._performer, self._source.rate, self._closing
+            ),
             conditioning=self._conditioning,
             shown=self._window is not None,
         )
