@@ -72,6 +72,7 @@ class BridgeStream:
         self._inbox: BridgeInbox = (
             NewestOfEach() if bridge.mode == LATEST else EveryOne(2 * MAX_WINDOW)
         )
+        self._listeners: tuple[Callable[[SkeletonFrame], None], ...] = ()
         self._rhythm = Rhythm()
         self._packets = self._frames = 0
         self._last_seen = float("nan")
@@ -117,6 +118,13 @@ class BridgeStream:
             last_seen=self._last_seen,
             trouble=self._trouble(),
         )
+
+    def tap(self, listener: Callable[[SkeletonFrame], None]) -> None:
+        """Show every frame from now on to `listener`, in order, on the bridge's thread.
+
+        The listener must neither wait nor raise.
+        """
+        self._listeners = (*self._listeners, listener)
 
     def poll(self) -> Sequence[SkeletonFrame]:
         """What has come since the last poll, oldest first; never blocks."""
@@ -211,6 +219,8 @@ class BridgeStream:
         frames = self._receiver.feed(data, arrival)
         for frame in frames:
             self._rhythm.note(arrival, frame.performer)
+            for listener in self._listeners:
+                listener(frame)
         self._frames += len(frames)
         self._inbox.put(frames)
         if frames:
