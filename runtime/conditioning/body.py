@@ -38,6 +38,7 @@ class Body:
         group: (J,) which joints are exchanged together, -1 for none.
         bones: (B,) the far ends of the limbs' long bones, whose length a person keeps.
         near: (B,) their near ends.
+        beyond: (B, J) bool, the far end of each and all that hangs on it.
         feet: (F,) ankles and toes.
         feet_rest: (F,) [m] how high above the floor these are as one stands.
     """
@@ -46,6 +47,7 @@ class Body:
     group: Indices
     bones: Indices
     near: Indices
+    beyond: NDArray[np.bool_]
     feet: Indices
     feet_rest: Array
 
@@ -92,6 +94,16 @@ def body_of(skeleton: Skeleton) -> Body:
         group,
         np.array(far, dtype=np.int64),
         skeleton.parents[far].astype(np.int64) if far else np.zeros(0, dtype=np.int64),
+        _beyond(skeleton, far),
         np.array(feet, dtype=np.int64),
         height[feet] - height.min() + sole if feet else np.zeros(0),
     )
+
+
+def _beyond(skeleton: Skeleton, joints: list[int]) -> NDArray[np.bool_]:
+    """For each of the joints which (J,) are itself or hang on it."""
+    out = np.zeros((len(joints), len(skeleton.names)), dtype=bool)
+    out[np.arange(len(joints)), joints] = True
+    for joint in skeleton.order[1:]:
+        out[:, joint] |= out[:, skeleton.parents[joint]]
+    return out

@@ -14,6 +14,7 @@ from runtime.conditioning.faults import Faults
 from runtime.conditioning.held_pose import HeldPose
 from runtime.conditioning.levelling import Levelling
 from runtime.conditioning.mirror import mirrored
+from runtime.conditioning.rejoining import Rejoining
 from runtime.conditioning.stature import Stature
 from runtime.conditioning.switches import Conditioning
 from solvers.one_euro import OneEuroFilter
@@ -52,8 +53,11 @@ class ConditionedFrame:
 class _Memory:
     """What is remembered of one performer."""
 
-    def __init__(self, faults: Faults, stature: Stature, held: HeldPose) -> None:
+    def __init__(
+        self, faults: Faults, rejoining: Rejoining, stature: Stature, held: HeldPose
+    ) -> None:
         self.faults = faults
+        self.rejoining = rejoining
         self.filter = OneEuroFilter()
         self.predictor = Predictor()
         self.stature = stature
@@ -107,7 +111,13 @@ class Conditioner:
         if on.swaps or on.outliers:
             positions, corrected = self._mend(memory, frame)
         whole = self._filler.place(positions, frame.time, frame.performer)
-        positions, predicted = self._smooth(memory, whole.positions, dt), self._nothing
+        positions, predicted = whole.positions, self._nothing
+        if on.outliers:
+            positions, late = memory.rejoining.lead(positions, whole.filled, frame.time)
+            corrected = corrected | late
+        else:
+            memory.rejoining.forget()
+        positions = self._smooth(memory, positions, dt)
         if on.predict:
             ahead = memory.predictor.predict(positions, dt)
             positions = np.where(whole.filled[:, None], positions, ahead)
@@ -120,8 +130,9 @@ class Conditioner:
     def _memory(self, performer: int) -> _Memory:
         memory = self._memories.get(performer)
         if memory is None:
-            faults = Faults(self._body, len(self._skeleton.names))
-            memory = _Memory(faults, Stature(self._skeleton), HeldPose(self._skeleton))
+            count = len(self._skeleton.names)
+            faults, rejoining = Faults(self._body, count), Rejoining(count)
+            memory = _Memory(faults, rejoining, Stature(self._skeleton), HeldPose(self._skeleton))
             self._memories[performer] = memory
             if len(self._memories) > MOST_PERFORMERS:
                 del self._memories[next(iter(self._memories))]

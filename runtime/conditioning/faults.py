@@ -23,7 +23,8 @@ VELOCITY_SECONDS = 0.02  # [s] shorter steps tell too little of a velocity to go
 INSIST_AT_LEAST, INSIST_AT_MOST = 0.5, 10.0  # [s] that a device must say otherwise to be believed
 
 JUMP = 0.1  # [m] from where a joint is expected, at once
-FASTEST = 8.0  # [m/s] further, for each second since it was believed
+FASTEST = 6.0  # [m/s] further, for each second since it was believed
+LONGEST_REACH = 0.1  # [s] for which that goes on
 BELIEVED = 3  # frames after which a joint is known well enough to be doubted
 CONFIRMED_SECONDS = 0.12  # [s] in one place after which a joint is believed there
 CONFIRMED_CUT = 2  # frames after which a jump of the whole body is believed
@@ -149,14 +150,16 @@ class Faults:
         trust = self._trust
         offset = positions - wanted
         distance = np.sqrt(np.einsum("ij,ij->i", offset, offset))
-        far: Bools = distance > JUMP + FASTEST * gap  # False where nothing is expected
+        far: Bools = distance > JUMP + FASTEST * np.minimum(
+            gap, LONGEST_REACH
+        )  # False where nothing is expected
         far &= trust.times >= BELIEVED
-        doubtful: Bools = far | self._stretched(positions, distance)
-        if not doubtful.any():
+        stretched = self._stretched(positions, distance)
+        if not far.any():
             trust.doubts[:] = 0
-            return doubtful
+            return stretched
         cut = np.count_nonzero(far) >= CUT * np.count_nonzero(seen)
-        return doubtful & ~self._confirmed(positions, doubtful, time, bool(cut))
+        return (far & ~self._confirmed(positions, far, time, bool(cut))) | stretched
 
     def _confirmed(self, positions: Array, doubtful: Bools, time: float, cut: bool) -> Bools:
         """Which doubtful joints have been so near one place for so long that they are there."""
@@ -174,7 +177,8 @@ class Faults:
         return confirmed
 
     def _stretched(self, positions: Array, distance: Array) -> Bools:
-        """The less expected ends of the long bones that have not their usual length."""
+        """The less expected ends of the long bones that have not their usual length, and what hangs
+        on these. Nobody needs to confirm them: the usual length gives way with time."""
         body, trust = self._body, self._trust
         ends = positions[body.bones] - positions[body.near]
         length = np.sqrt(np.einsum("ij,ij->i", ends, ends))
@@ -191,7 +195,8 @@ class Faults:
         joints = np.zeros(len(positions), dtype=bool)
         if judged.any():
             worse = np.nan_to_num(distance[body.bones]) >= np.nan_to_num(distance[body.near])
-            joints[np.where(worse, body.bones, body.near)[judged]] = True
+            joints[body.near[judged & ~worse]] = True
+            joints |= body.beyond[judged & worse].any(axis=0)
         return joints
 
     def _believe(self, positions: Array, seen: Bools, time: float) -> None:
