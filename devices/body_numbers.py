@@ -44,7 +44,8 @@ class BodyNumbers:
         return numbers
 
     def _free(self, place: Array, taken: set[int]) -> int:
-        free = [number for number in range(len(self._ids) + 1) if number not in taken]
+        most = len(self._ids) + len(taken) + 1
+        free = [number for number in range(most) if number not in taken]
         far = {
             number: float(np.linalg.norm(place - self._places[number]))
             for number in free

@@ -41,5 +41,5 @@ def camera_position(shape: Array, picture: Array, weights: Array, focal: float) 
     place, _, rank, _ = np.linalg.lstsq(*weighted, rcond=None)
     if rank < 3 or not NEAREST < place[2] < FURTHEST:
         return None
-    found: Array = place
+    found: Array = place.astype(np.float64)
     return found

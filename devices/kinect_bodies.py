@@ -113,8 +113,7 @@ class KinectDecoder:
         bodies = {body.id: _in_world(body, self._sensor.to_world) for body in sight.bodies}
         if self._level:
             self._learn_floor(sight, list(bodies.values()))
-        root = self.skeleton.root
-        numbers = self._numbers({body.id: body.positions[root] for body in bodies.values()})
+        numbers = self._numbers({body.id: _middle(body) for body in bodies.values()})
         return [
             self._frame(body, numbers[body.id], time, arrival)
             for body in sorted(bodies.values(), key=lambda body: numbers[body.id])
@@ -139,6 +138,12 @@ class KinectDecoder:
             performer=number,
             arrival=arrival,
         )
+
+
+def _middle(body: Body) -> Array:
+    """(3,) [m] the mean of the joints that are seen; NaN where none is."""
+    seen = body.positions[body.confidence > 0.0]
+    return np.mean(seen, axis=0) if len(seen) else np.full(3, np.nan)
 
 
 def _in_world(body: Body, to_world: Array) -> Body:
