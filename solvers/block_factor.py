@@ -20,7 +20,7 @@ import scipy.sparse as sp
 from numba import prange
 from numpy.typing import NDArray
 
-from solvers.compiled import kernel, parallel_kernel
+from solvers.compiled import kernel, one_blas_thread, parallel_kernel
 from solvers.laplacian import Floats
 from solvers.nested_dissection import Dissection
 
@@ -119,8 +119,9 @@ class BlockFactor:
         """
         stale = _stale_tasks(self._entries, values, self._blocks, self._schedule)
         self._entries.values[:] = values
-        _factorise(self._entries, stale, self._blocks, self._schedule, self._updates)
-        self._check()
+        with one_blas_thread():
+            _factorise(self._entries, stale, self._blocks, self._schedule, self._updates)
+            self._check(rounds=1)
 
     def add_solution(self, b: Floats, x: Floats) -> None:
         """Add the solution y of A y = b, both (n, 3), to the first n rows of x."""
@@ -148,12 +149,15 @@ class BlockFactor:
             np.zeros((tasks + 1, 4 * WIDTH), precision),
         )
         every = np.ones(tasks, np.bool_)
-        _factorise(self._entries, every, self._blocks, schedule, self._updates)
-        self._check()
+        with one_blas_thread():
+            _factorise(self._entries, every, self._blocks, schedule, self._updates)
+            self._check(rounds=3)
 
-    def _check(self) -> None:
+    def _check(self, rounds: int) -> None:
         """Go over to double precision, for good, where single precision loses too much."""
-        if self._blocks.ups.dtype == np.float32 and _lost_share(self._matrix, self) > _LOST_MOST:
+        if self._blocks.ups.dtype == np.float64:
+            return
+        if _lost_share(self._matrix, self, rounds) > _LOST_MOST:
             self._fill(np.float64)
 
 
@@ -180,7 +184,7 @@ def _plan(entries: Entries, tree: Dissection) -> tuple[Blocks, Schedule, Updates
     )
 
 
-def _lost_share(matrix: sp.csr_matrix, factor: BlockFactor) -> float:
+def _lost_share(matrix: sp.csr_matrix, factor: BlockFactor, rounds: int) -> float:
     """The share of an error, in the matrix's norm, that a solve leaves of it; the worst of a few.
 
     A step that corrects by this solve descends on the quadratic form as long as the share is below
@@ -189,7 +193,7 @@ def _lost_share(matrix: sp.csr_matrix, factor: BlockFactor) -> float:
     error = np.random.default_rng(0).standard_normal((matrix.shape[0], 3))
     found = np.empty_like(error)
     worst = 0.0
-    for _ in range(3):
+    for _ in range(rounds):
         image = matrix @ error
         before = float(np.vdot(error, image))
         if not before > 0.0:

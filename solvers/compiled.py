@@ -4,8 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
+from functools import cache
+from importlib import import_module
 from typing import TypeVar, cast
+
+from threadpoolctl import ThreadpoolController
 
 # Threads that wait for work must sleep, not spin: a performance shares its cores with the renderer
 # and the devices, and a spinning thread takes the core that the last working one needs (measured on
@@ -72,3 +76,17 @@ def threads_for(vertices: int) -> Iterator[None]:
 def most_threads() -> int:
     """How many threads a kernel may run on, so that each can have room of its own."""
     return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+
+
+def one_blas_thread() -> AbstractContextManager[object]:
+    """Let dense products within use the calling thread only.
+
+    A BLAS whose threads spin while they wait takes the cores that the kernels' threads need.
+    """
+    return _blas().limit(limits=1, user_api="blas")
+
+
+@cache
+def _blas() -> ThreadpoolController:
+    import_module("scipy.linalg.cython_blas")  # what compiled kernels call; found once it is loaded
+    return ThreadpoolController()
