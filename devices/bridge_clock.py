@@ -79,8 +79,9 @@ class ClockOffset:
         ]
         self._samples = deque([*agreeing, newest], maxlen=SAMPLES)
         best = min(self._samples, key=lambda one: one.bound_at(back))
-        self._bound = best.bound_at(back)
-        # Inside the bounds nothing is gained by moving, and times that move jitter.
-        used = best.offset if self._offset is None else self._offset
-        self._offset = min(max(used, best.offset - self._bound), best.offset + self._bound)
+        bound = best.bound_at(back)
+        # Inside the bounds nothing is known to be better, and times that move jitter.
+        used = self._offset if agreeing and self._offset is not None else best.offset
+        self._offset = min(max(used, best.offset - bound), best.offset + bound)
+        self._bound = bound + abs(self._offset - best.offset)
         return True
