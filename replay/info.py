@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,26 @@ from numpy.typing import NDArray
 from replay.recording import Recording
 
 GAP_FACTOR = 3.0  # a step this many medians long is a gap
+MOST_GAPS = 5  # that are listed, the longest
+MOST_LISTED = 16  # performers
+MOST_LETTERS = 300  # of a text from the file
+
+
+@dataclass(frozen=True, slots=True)
+class Gap:
+    """A time without a frame of a performer, far longer than the usual step.
+
+    Attributes:
+        performer: whose.
+        begin: of the last frame before it [s].
+        seconds: until the next frame [s].
+        missing: about how many frames are not there.
+    """
+
+    performer: int
+    begin: float
+    seconds: float
+    missing: int
 
 
 def summary(recording: Recording, path: Path, kind: str) -> list[str]:
@@ -20,13 +41,17 @@ def summary(recording: Recording, path: Path, kind: str) -> list[str]:
     """
     names = recording.skeleton.names
     steps = performer_steps(recording)
+    gaps = gaps_of(recording)
     lines = [
         f"{path.name}: {kind}",
+        *(f"{_shown(name):<11} {_shown(text)}" for name, text in sorted(recording.source.items())),
         f"frames      {len(recording)} in {recording.seconds:.3f} s",
         f"rate        {_rate(steps)}",
-        f"gaps        {_gaps(steps)}",
+        f"gaps        {_gaps(gaps)}",
+        *(f"            {_gap(gap)}" for gap in _longest(gaps)),
+        f"stamps      {_stamps(recording)}",
         f"joints      {len(names)}, root {names[recording.skeleton.root]}: {', '.join(names)}",
-        f"performers  {len(np.unique(recording.performers))}",
+        *_performers(recording),
         f"missing     {_missing(recording)}",
         f"size        {_size(recording)}",
         f"rotations   {'none' if recording.rotations is None else 'of every joint'}",
@@ -34,6 +59,41 @@ def summary(recording: Recording, path: Path, kind: str) -> list[str]:
     if np.isfinite(recording.arrivals).any():
         lines.append(f"latency     {_latency(recording)}")
     return lines + [f"note        {note}" for note in recording.notes]
+
+
+def _shown(text: str) -> str:
+    """Of a text from a file, what a terminal may safely show."""
+    return "".join(letter if letter.isprintable() else "?" for letter in text[:MOST_LETTERS])
+
+
+def gaps_of(recording: Recording) -> list[Gap]:
+    """Every gap, in the order of time; a gap is longer than three median steps of its performer."""
+    gaps = []
+    for performer in np.unique(recording.performers).tolist():
+        times = recording.times[recording.performers == performer]
+        steps = np.diff(times)
+        rising = steps[steps > 0]
+        usual = float(np.median(rising)) if len(rising) else np.inf
+        for index in np.flatnonzero(steps > GAP_FACTOR * usual):
+            missing = max(round(float(steps[index]) / usual) - 1, 1)
+            gaps.append(Gap(performer, float(times[index]), float(steps[index]), missing))
+    return sorted(gaps, key=lambda gap: gap.begin)
+
+
+def stamps_of(recording: Recording) -> tuple[int, int]:
+    """How many frames have the time of the one before, and how many came after a later one.
+
+    The second is known where the file tells arrivals.
+    """
+    repeated = late = 0
+    for performer in np.unique(recording.performers):
+        own = recording.performers == performer
+        times, arrivals = recording.times[own], recording.arrivals[own]
+        repeated += int(np.count_nonzero(np.diff(times) == 0))
+        known = np.isfinite(arrivals)
+        came = times[known][np.argsort(arrivals[known], kind="stable")]
+        late += int(np.count_nonzero(came < np.maximum.accumulate(came)))
+    return repeated, late
 
 
 def performer_steps(recording: Recording) -> NDArray[np.float64]:
@@ -50,10 +110,48 @@ def _rate(steps: NDArray[np.float64]) -> str:
     return f"{1.0 / median:.2f} frames/s (median), jitter {1e3 * jitter:.1f} ms"
 
 
-def _gaps(steps: NDArray[np.float64]) -> str:
-    median = float(np.median(steps)) if len(steps) else 0.0
-    gaps = steps[steps > GAP_FACTOR * median] if median > 0 else steps[:0]
-    return "none" if len(gaps) == 0 else f"{len(gaps)}, the longest {gaps.max():.3f} s"
+def _gaps(gaps: list[Gap]) -> str:
+    if not gaps:
+        return "none"
+    return (
+        f"{len(gaps)}, the longest {max(gap.seconds for gap in gaps):.3f} s; "
+        f"{sum(gap.seconds for gap in gaps):.3f} s in all, "
+        f"about {sum(gap.missing for gap in gaps)} frames missing"
+    )
+
+
+def _longest(gaps: list[Gap]) -> list[Gap]:
+    kept = sorted(gaps, key=lambda gap: -gap.seconds)[:MOST_GAPS]
+    return sorted(kept, key=lambda gap: gap.begin)
+
+
+def _gap(gap: Gap) -> str:
+    return (
+        f"from {gap.begin:.3f} s for {gap.seconds:.3f} s, performer {gap.performer}, "
+        f"about {gap.missing} frames"
+    )
+
+
+def _stamps(recording: Recording) -> str:
+    repeated, late = stamps_of(recording)
+    if not (repeated or late):
+        return "rising"
+    return f"{repeated} repeated, {late} came after a later one"
+
+
+def _performers(recording: Recording) -> list[str]:
+    """How many there are, and of several, who was there when."""
+    numbers = np.unique(recording.performers).tolist()
+    lines = [f"performers  {len(numbers)}"]
+    for number in numbers[:MOST_LISTED] if len(numbers) > 1 else []:
+        times = recording.times[recording.performers == number]
+        lines.append(
+            f"            performer {number}: {len(times)} frames, "
+            f"{times[0]:.3f} to {times[-1]:.3f} s, {_rate(np.diff(times))}"
+        )
+    if len(numbers) > MOST_LISTED:
+        lines.append(f"            and {len(numbers) - MOST_LISTED} more")
+    return lines
 
 
 def _missing(recording: Recording) -> str:

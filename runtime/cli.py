@@ -260,7 +260,16 @@ def parser() -> argparse.ArgumentParser:
     doctor = add("doctor", _command("doctor", "doctor"), "what is wrong with this machine")
     doctor.add_argument("--warm", action="store_true", help="compile the solvers ahead of time")
     bench = add("bench", _command("bench", "bench"), "how fast it is here")
-    bench.add_argument("name", nargs="?", metavar="NAME", help="arap, tick or match; all if absent")
+    bench.add_argument(
+        "name",
+        nargs="?",
+        metavar="NAME",
+        help="arap, tick or match, all if absent; soak or kill, which take long",
+    )
+    bench.add_argument("--seconds", type=positive, help="of show in `bench soak` (default 3600)")
+    bench.add_argument(
+        "--real-time", action="store_true", help="soak at 60 Hz, not as fast as it goes"
+    )
     bench.add_argument("--json", type=Path, metavar="FILE", help="write the figures there as well")
     return top
 

@@ -16,7 +16,7 @@ def provenance(origin: str) -> dict[str, str]:
 
     Returns:
         ``origin``, ``program``, and the same moment on two clocks: ``began``, UTC as ISO 8601, and
-        ``began_on_host_clock`` [s], the monotonic clock of the frames, so that frames can be dated.
+        ``host_clock`` [s], the monotonic clock of the frames, so that frames can be dated.
     """
     try:
         program = f"bunraku {version('bunraku')}"
@@ -26,7 +26,7 @@ def provenance(origin: str) -> dict[str, str]:
         "origin": _without_password(origin),
         "program": program,
         "began": datetime.now(UTC).isoformat(timespec="milliseconds"),
-        "began_on_host_clock": f"{time.monotonic():.6f}",
+        "host_clock": f"{time.monotonic():.6f}",
     }
 
 

@@ -11,21 +11,33 @@ from typing import Any
 from devices.errors import InputError
 from runtime.output.whole_file import check_writable, whole_file
 
-NAMES = ("arap", "tick", "match")
+NAMES = ("arap", "table1", "hold", "tick", "match")
+LONG = ("soak", "kill")  # only when named
 
 
 def bench(options: argparse.Namespace) -> int:
     """Run one benchmark or all; print each and write the figures as JSON if asked."""
-    if options.name is not None and options.name not in NAMES:
-        raise InputError(f"there is no benchmark {options.name!r}; there are: {', '.join(NAMES)}")
+    if options.name is not None and options.name not in NAMES + LONG:
+        there = ", ".join(NAMES + LONG)
+        raise InputError(f"there is no benchmark {options.name!r}; there are: {there}")
+    wishes = _wishes(options)
     if options.json is not None:
         check_writable(options.json)
     figures: dict[str, Any] = {}
     for name in [options.name] if options.name else NAMES:
-        figures[name] = importlib.import_module(f"runtime.benchmarks.{name}").run()
+        figures[name] = importlib.import_module(f"runtime.benchmarks.{name}").run(**wishes)
     if options.json is not None:
         _write(options.json, figures)
     return 0
+
+
+def _wishes(options: argparse.Namespace) -> dict[str, Any]:
+    """What was asked of the soak, which alone can be asked for more or less."""
+    asked = {"seconds": options.seconds, "real_time": options.real_time or None}
+    wishes = {name: value for name, value in asked.items() if value is not None}
+    if wishes and options.name != "soak":
+        raise InputError("--seconds and --real-time are for `bunraku bench soak`; leave them out")
+    return wishes
 
 
 def _write(path: Path, figures: dict[str, Any]) -> None:
