@@ -74,6 +74,7 @@ class Puppet:
         tree: the character's nodes, hung on `root`.
         root: the node that stays in place.
         mapping: what drives it, or would.
+        binding: how its surface hangs on the nodes.
         gains: for each drive the share of the performer's turns that is carried over, in (0, 1].
     """
 
@@ -84,7 +85,7 @@ class Puppet:
         tree = Tree(skeleton.parents, skeleton.rest_positions)
         self.root = abstract(tree).root
         self.tree = tree.rerooted(self.root)
-        self._binding = bind(
+        self.binding = bind(
             character.vertices,
             character.faces,
             self.tree.parents,
@@ -94,12 +95,12 @@ class Puppet:
         self._solver = ArapSolver(
             character.vertices,
             character.faces,
-            self._binding.handles,
-            groups=self._binding.anchor,
+            self.binding.handles,
+            groups=self.binding.anchor,
         )
         self._offsets = (
-            character.vertices[self._binding.handles]
-            - self.tree.positions[self._binding.pivot[self._binding.anchor]]
+            character.vertices[self.binding.handles]
+            - self.tree.positions[self.binding.pivot[self.binding.anchor]]
         )
         self._edges = unique_edges(character.vertices, character.faces)
         self._rest_lengths = np.linalg.norm(
@@ -163,7 +164,7 @@ class Puppet:
         self._parents = self.tree.rerooted(root).parents
         self._driven = np.array([node for chain in chains for node in chain[1:]], dtype=np.int64)
         self._chains = chains
-        node, pivot = self._binding.node, self._binding.pivot
+        node, pivot = self.binding.node, self.binding.pivot
         # A bone is known by its end that lies away from the root, which may not be the binding's.
         self._bone = np.where(self._parents[pivot] == node, pivot, node)
         self._bone[node == pivot] = -1
@@ -221,15 +222,15 @@ class Puppet:
         for node in Tree(self._parents, self.tree.positions).order:
             if self._parents[node] >= 0:
                 moved[node] |= moved[self._parents[node]]
-        bone = np.where(self._bone >= 0, self._bone, self._binding.node)
-        near, far = bone[self._binding.owner][self._edges].T
+        bone = np.where(self._bone >= 0, self._bone, self.binding.node)
+        near, far = bone[self.binding.owner][self._edges].T
         pulls: NDArray[np.bool_] = bent[near] | bent[far] | (moved[near] != moved[far])
         return pulls
 
     def limb(self, chain: tuple[int, ...]) -> tuple[int, ...]:
         """Give the part of a chain of nodes that lies outside the trunk, two nodes at least."""
         start = 0
-        while start + 2 < len(chain) and self._binding.inside[chain[start + 1]]:
+        while start + 2 < len(chain) and self.binding.inside[chain[start + 1]]:
             start += 1
         return chain[start:]
 
@@ -283,10 +284,10 @@ class Puppet:
         anchors = np.where(
             (self._bone >= 0)[:, None],
             self._bones[self._bone],
-            self._rotations[self._binding.node],
+            self._rotations[self.binding.node],
         )
-        turn = Rotation.from_quat(anchors).as_matrix()[self._binding.anchor]
-        pivots = self._positions[self._binding.pivot][self._binding.anchor]
+        turn = Rotation.from_quat(anchors).as_matrix()[self.binding.anchor]
+        pivots = self._positions[self.binding.pivot][self.binding.anchor]
         targets: Array = np.einsum("hij,hj->hi", turn, self._offsets) + pivots
         return targets
 

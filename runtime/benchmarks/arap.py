@@ -11,6 +11,7 @@ import numpy as np
 from numba import get_num_threads, prange
 from numpy.typing import NDArray
 
+from runtime.benchmarks.torus import pulled_patch, torus
 from solvers.arap import ArapSolver
 from solvers.arap_cells import SPOKES, build_cells
 from solvers.arap_kernels import fit_cells, residual
@@ -37,7 +38,7 @@ def run(sizes: Sequence[int] = SIZES) -> dict[str, object]:
     )
     rows = []
     for size in sizes:
-        row = _measure(*_torus(size))
+        row = _measure(*torus(size))
         row["memory_share"] = row["megabytes"] / row["ours_ms"] / bandwidth
         rows.append(row)
         peer = row["libigl_ms"]
@@ -54,7 +55,7 @@ def run(sizes: Sequence[int] = SIZES) -> dict[str, object]:
 
 def _measure(vertices: Floats, faces: Ints) -> dict[str, Any]:
     """Both solvers on the same handles and targets, in turn, so that both see the same machine."""
-    handles, targets = _handles(vertices)
+    handles, targets = pulled_patch(vertices)
     start = perf_counter()
     ours = ArapSolver(vertices, faces, handles)
     build = perf_counter() - start
@@ -128,32 +129,6 @@ def _libigl(
         return igl.arap_solve(targets, data, start)
 
     return solve
-
-
-def _torus(count: int) -> tuple[Floats, Ints]:
-    """A torus of about `count` vertices with nearly equilateral triangles."""
-    across = round((count * 0.35) ** 0.5)
-    along = round(count / across)
-    u, v = np.meshgrid(np.arange(along), np.arange(across), indexing="ij")
-    a = (u * across + v).ravel()
-    b = ((u + 1) % along * across + v).ravel()
-    c = ((u + 1) % along * across + (v + 1) % across).ravel()
-    d = (u * across + (v + 1) % across).ravel()
-    big, small = 2 * np.pi * u / along, 2 * np.pi * v / across
-    ring = 1.0 + 0.35 * np.cos(small)
-    vertices = np.stack([ring * np.cos(big), 0.35 * np.sin(small), ring * np.sin(big)], axis=-1)
-    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-    return vertices.reshape(-1, 3), faces.astype(np.int64)
-
-
-def _handles(vertices: Floats) -> tuple[Ints, Floats]:
-    """Two opposite patches of 1 % each, one of which is pulled away."""
-    order = np.argsort(vertices[:, 0], kind="stable")
-    patch = max(1, len(vertices) // 100)
-    handles = np.concatenate([order[:patch], order[-patch:]])
-    targets = vertices[handles]
-    targets[patch:] += [0.3, 0.2, 0.1]
-    return handles, targets
 
 
 def _milliseconds(call: Callable[[], object]) -> float:

@@ -269,7 +269,7 @@ def test_resting_again_brings_it_back(puppet: Puppet) -> None:
 
 
 def test_the_part_of_a_chain_in_the_trunk_is_cut_off(puppet: Puppet) -> None:
-    inside = np.flatnonzero(puppet._binding.inside)
+    inside = np.flatnonzero(puppet.binding.inside)
     arm = tuple(map(node, ("chest", "shoulder.L", "elbow.L", "wrist.L")))
     assert node("shoulder.L") in inside
     assert puppet.limb(arm) == arm[1:]
@@ -285,8 +285,8 @@ def test_a_rigs_weights_decide_what_a_bone_takes_along() -> None:
     weights[left, node("shoulder.L")] = 1.0
     weights[~left, node("pelvis")] = 1.0
     puppet = Puppet(replace(FIGURE, weights=csr_array(weights)))
-    held = np.isin(puppet._binding.handles, np.flatnonzero(left))
-    ends = puppet._binding.node[puppet._binding.anchor[held]]
+    held = np.isin(puppet.binding.handles, np.flatnonzero(left))
+    ends = puppet.binding.node[puppet.binding.anchor[held]]
     assert set(ends.tolist()) == {node("elbow.L")} | set(ends[ends == node("wrist.L")].tolist())
     np.testing.assert_allclose(puppet.deform().vertices, FIGURE.vertices, atol=1e-9)
 

@@ -1,0 +1,232 @@
+"""What a proxy saves on a dense character, and how far it is from the full solve.
+
+Both deform the same character in the same run, frame by frame, by the same handles. Beside the
+proxy's distance from the full solve stands the full solve's own distance from where it would
+settle, had it time: the yardstick for what an answer within a tick is worth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numba import get_num_threads
+from numpy.typing import NDArray
+
+from replay.builtin import builtin_recording
+from replay.recording import Recording
+from runtime.character import Character
+from runtime.characters.builtin import builtin_character
+from runtime.characters.proxy import DENSE, Proxy, proxy_of
+from runtime.director import Choices, Director
+from runtime.performer import Performer
+from runtime.puppet import Puppet
+from runtime.rehearsal import rehearse
+from runtime.render.camera import front_camera
+from solvers.arap import ArapSolver
+from solvers.binding import bind
+from solvers.decimation import decimate
+from solvers.edges import unique_edges
+
+SIZES = (10_000, 20_000, 40_000, 100_000, 160_000, 300_000)
+FRAMES = 100
+STEP = 4  # frames of the recording: 15 a second, as a slow camera gives
+COMPARED = 10  # every so many frames that are performed
+ITERATIONS = 2  # a tick, as a show has
+SETTLED = 60  # iterations after which nothing moves
+MOST_SETTLED = 50_000  # vertices up to which the settled answer is computed
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Figures = dict[str, float]
+
+
+def run(sizes: Sequence[int] = SIZES) -> dict[str, object]:
+    """Print a table and return it: milliseconds a tick at the median, and the error."""
+    print(f"dense: {ITERATIONS} iterations a tick, {get_num_threads()} threads, proxy over {DENSE}")
+    print(
+        f"{'vertices':>8} {'full ms':>8} {'proxy':>6} {'follow':>6} {'times':>5} {'GB/s':>5}"
+        f" {'RMS %':>6} {'p99 %':>6} {'stretch':>13} {'normals':>12} {'settled %':>9}"
+        f" {'build s':>13}"
+    )
+    rows = []
+    for size in sizes:
+        row = measure(dense_character(size), builtin_recording(), settle=size <= MOST_SETTLED)
+        rows.append(row)
+        print(_line(row), flush=True)
+    return {"threads": get_num_threads(), "iterations": ITERATIONS, "sizes": rows}
+
+
+def _line(row: dict[str, Any]) -> str:
+    settled = f"{row['settled']['rms']:9.3f}" if row["settled"] else f"{'-':>9}"
+    error = row["error"]
+    return (
+        f"{row['vertices']:>8} {row['full_ms']:8.2f} {row['proxy_ms']:6.2f} {row['follow_ms']:6.2f}"
+        f" {row['full_ms'] / row['proxy_ms']:5.1f} {row['follow_gb_s']:5.1f}"
+        f" {error['rms']:6.3f} {error['p99']:6.3f}"
+        f" {error['stretch_full']:6.3f} {error['stretch']:6.3f}"
+        f" {error['normals_mean']:5.1f} {error['normals_p99']:6.1f} {settled}"
+        f" {row['full_build_s']:6.2f} {row['proxy_build_s']:6.2f}"
+    )
+
+
+def dense_character(count: int) -> Character:
+    """The built-in mannequin with about `count` vertices: subdivided after Loop, then thinned."""
+    import trimesh  # noqa: PLC0415  slow to import
+
+    character = builtin_character("mannequin")
+    vertices, faces = character.vertices, character.faces
+    while len(vertices) < 0.98 * count:
+        finer = trimesh.Trimesh(vertices, faces, process=False).subdivide_loop()
+        vertices, faces = np.asarray(finer.vertices), np.asarray(finer.faces, dtype=np.int64)
+    if len(vertices) > 1.02 * count:
+        thinned = decimate(vertices, faces, count)
+        vertices, faces = vertices[thinned.kept], thinned.faces
+    return replace(character, vertices=np.ascontiguousarray(vertices), faces=faces, weights=None)
+
+
+@dataclass(frozen=True, slots=True)
+class _Handles:
+    """What moves the surface: coarse vertices (H,), their groups (H,), targets (H, 3) a frame."""
+
+    chosen: Ints
+    groups: Ints
+    targets: list[Floats]
+
+
+def measure(
+    character: Character, recording: Recording, *, settle: bool, frames: int = FRAMES
+) -> dict[str, Any]:
+    """Perform with both; times are medians [ms], errors are taken over all frames compared.
+
+    Args:
+        character: of any size.
+        recording: what drives it.
+        settle: compute the settled answer too.
+        frames: from the start of the recording.
+    """
+    start = perf_counter()
+    proxy = proxy_of(character, dense=0, count=min(9_000, len(character.vertices) // 2))
+    handles = _perform(character, proxy, recording, frames)
+    coarse = ArapSolver(proxy.vertices, proxy.faces, handles.chosen, groups=handles.groups)
+    built = perf_counter()
+    chosen = proxy.kept[handles.chosen]
+    full = ArapSolver(character.vertices, character.faces, chosen, groups=handles.groups)
+    built_full = perf_counter()
+    patient = None
+    if settle:
+        patient = ArapSolver(character.vertices, character.faces, chosen, groups=handles.groups)
+    times, errors, unsettled = [], [], []
+    comparison = Comparison(character.vertices, character.faces)
+    for number, targets in enumerate(handles.targets):
+        stamps = [perf_counter()]
+        answer = full.solve(targets, ITERATIONS)
+        stamps.append(perf_counter())
+        moved = coarse.solve(targets, ITERATIONS)
+        stamps.append(perf_counter())
+        followed = proxy.follow(moved)
+        stamps.append(perf_counter())
+        times.append(1e3 * np.diff(stamps))
+        if number % COMPARED == COMPARED - 1:
+            errors.append(comparison.figures(followed, answer))
+            if patient is not None:
+                unsettled.append(comparison.figures(answer, patient.solve(targets, SETTLED)))
+    full_ms, solve_ms, follow_ms = np.median(times, axis=0).tolist()
+    moved_bytes = proxy.surface.bytes_moved if proxy.surface is not None else 0
+    return {
+        "vertices": len(character.vertices),
+        "proxy_vertices": len(proxy.vertices),
+        "full_ms": full_ms,
+        "proxy_ms": solve_ms + follow_ms,
+        "follow_ms": follow_ms,
+        "follow_gb_s": moved_bytes / 1e6 / follow_ms,
+        "follow_bytes_a_vertex": moved_bytes / len(character.vertices),
+        "error": _over_all(errors),
+        "settled": _over_all(unsettled),
+        "proxy_build_s": built - start,
+        "full_build_s": built_full - built,
+    }
+
+
+def _perform(character: Character, proxy: Proxy, recording: Recording, frames: int) -> _Handles:
+    """Let a puppet of the proxy perform, and note where its handles go."""
+    coarse = replace(character, vertices=proxy.vertices, faces=proxy.faces, weights=proxy.weights)
+    puppet = Puppet(coarse)
+    performer, camera = Performer(recording.skeleton), front_camera()
+    director = Director(performer, [puppet], lambda: camera.view_rotation, Choices(), [None])
+    rehearse(recording, "whole", director)
+    binding = bind(proxy.vertices, proxy.faces, puppet.tree.parents, puppet.tree.positions)
+    targets = []
+    for index in range(0, len(recording), STEP)[:frames]:
+        puppet.follow(performer.follow(recording.frame(index)))
+        targets.append(puppet.deform().vertices[binding.handles].copy())
+    return _Handles(binding.handles, binding.anchor, targets)
+
+
+class Comparison:
+    """Tells two deformed states of a surface apart.
+
+    Args:
+        vertices: (N, 3) at rest.
+        faces: (F, 3).
+    """
+
+    def __init__(self, vertices: Floats, faces: Ints) -> None:
+        self._rest, self._faces = vertices, faces
+        self._edges = unique_edges(vertices, faces)
+        self._lengths = _lengths(vertices, self._edges)
+        self._size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+
+    def figures(self, found: Floats, full: Floats) -> Figures:
+        """How far `found` (N, 3) is from `full` (N, 3).
+
+        Returns:
+            rms, p99: distance of the vertices, percent of the diagonal of the rest pose's box;
+            stretch, stretch_full: 99th percentile of |l / l0 - 1| of the edges of each;
+            normals_mean, normals_p99: angle between the vertices' normals [degrees].
+        """
+        gap = 100.0 * np.linalg.norm(found - full, axis=1) / self._size
+        cosine = np.einsum("ij,ij->i", self._normals(found), self._normals(full))
+        angle = np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0)))
+        return {
+            "rms": float(np.sqrt(np.mean(gap**2))),
+            "p99": float(np.percentile(gap, 99.0)),
+            "stretch": self._stretch(found),
+            "stretch_full": self._stretch(full),
+            "normals_mean": float(angle.mean()),
+            "normals_p99": float(np.percentile(angle, 99.0)),
+        }
+
+    def _stretch(self, vertices: Floats) -> float:
+        ratio = _lengths(vertices, self._edges) / self._lengths
+        return float(np.percentile(np.abs(ratio - 1.0), 99.0))
+
+    def _normals(self, vertices: Floats) -> Floats:
+        a, b, c = (vertices[self._faces[:, corner]] for corner in range(3))
+        of_face = np.cross(b - a, c - a)
+        normals = np.zeros_like(vertices)
+        for axis in range(3):
+            for corner in range(3):
+                normals[:, axis] += np.bincount(
+                    self._faces[:, corner], of_face[:, axis], minlength=len(vertices)
+                )
+        lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+        return np.asarray(normals / np.maximum(lengths, 1e-300))
+
+
+def _lengths(vertices: Floats, edges: Ints) -> Floats:
+    along = vertices[edges[:, 0]] - vertices[edges[:, 1]]
+    return np.asarray(np.linalg.norm(along, axis=1))
+
+
+def _over_all(figures: Sequence[Figures]) -> Figures:
+    """The root of the mean square of each figure; empty where nothing was compared."""
+    if not figures:
+        return {}
+    return {
+        name: float(np.sqrt(np.mean([frame[name] ** 2 for frame in figures])))
+        for name in figures[0]
+    }

@@ -1,0 +1,78 @@
+"""What it costs a frame when handles come, go or are held otherwise while a show runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from runtime.cast import character_named
+from runtime.characters.builtin import BUILTIN
+from runtime.puppet import Puppet
+from solvers.arap import ArapSolver
+
+FRAME = 16.0  # [ms] that a change may cost, its frame's own iterations included
+ITERATIONS = 2
+CHANGES = 12
+
+Ints = NDArray[np.int64]
+
+
+def run() -> dict[str, object]:
+    """Print, by character, a usual frame and the frames in which something changes [ms]."""
+    print(f"hold: a frame of {ITERATIONS} iterations with a change in it, ms, median / worst")
+    print(
+        f"{'character':<12} {'vertices':>8} {'usual':>13} {'let go':>13} {'hold':>13} {'weigh':>13}"
+    )
+    rows = []
+    for name in BUILTIN:
+        row = _measure(name)
+        rows.append(row)
+        print(
+            f"{name:<12} {row['vertices']:>8} "
+            + " ".join(
+                f"{row[kind]['p50']:6.2f}/{row[kind]['max']:6.2f}"
+                for kind in ("usual", "let_go", "hold", "weigh")
+            ),
+            flush=True,
+        )
+    return {"frame_ms": FRAME, "characters": rows}
+
+
+def _measure(name: str) -> dict[str, Any]:
+    character = character_named(name)
+    binding = Puppet(character).binding
+    handles, anchors = binding.handles, binding.anchor
+    rest = character.vertices
+    solver = ArapSolver(rest, character.faces, handles, groups=anchors)
+    out = np.empty_like(rest)
+    times: dict[str, list[float]] = {"usual": [], "let_go": [], "hold": [], "weigh": []}
+
+    def timed(kind: str, held: Ints, change: Callable[[], None]) -> None:
+        start = perf_counter()
+        change()
+        solver.solve(rest[held], ITERATIONS, out=out)
+        times[kind].append(1e3 * (perf_counter() - start))
+
+    for number in range(-2, CHANGES):  # the first two are not counted: memory is touched
+        kept = anchors != anchors[(number * 37) % len(anchors)]
+        some, groups = handles[kept], anchors[kept]
+        timed("usual", handles, lambda: None)
+        timed("let_go", some, partial(solver.hold, some, groups=groups))
+        timed("hold", handles, partial(solver.hold, handles, groups=anchors))
+        weights = np.where(kept, np.inf, 1.0)
+        timed("weigh", handles, partial(solver.weigh, weights))
+        timed("weigh", handles, partial(solver.weigh, np.full(len(handles), np.inf)))
+        if number < 0:
+            times = {kind: [] for kind in times}
+    return {
+        "vertices": len(rest),
+        **{
+            kind: {"p50": float(np.median(values)), "max": float(np.max(values))}
+            for kind, values in times.items()
+        },
+    }
