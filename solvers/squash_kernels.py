@@ -1,0 +1,369 @@
+"""The cells of squash and stretch as compiled kernels: uniform scales, axes, and local volume.
+
+The arrays are those of `solvers.arap_kernels`. A cell's edges enter only through its covariance
+S = sum of w e' e^T: with the best rotation R, trace(S R^T) is the numerator of the scale in
+eq. (8), and R^T S holds the cell's stretch as its rest edges see it. So the second state needs no
+second look at the edges.
+
+Source: Celikcan, Yaz and Capin 2015, section 4.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import get_thread_id, prange  # type: ignore[attr-defined]
+from numpy.typing import NDArray
+
+from solvers.arap_cells import Cells
+from solvers.compiled import kernel, parallel_kernel
+from solvers.laplacian import Floats
+from solvers.rotation_fit import LANES, fit_rotations
+
+_R = 9 * LANES
+
+# A scale outside this range counts as its end: no cell collapses to a point or grows for ever.
+LEAST_SCALE, LARGEST_SCALE = 0.2, 5.0
+
+# The most that a pressure may mend, in mean strains of the component times its volume. What no
+# squash explains (a bend loses volume too) is then not pumped into the little that is squashed.
+_MOST = 3.0
+
+_TINY = 1e-300
+
+
+class Planes(NamedTuple):
+    """What the rest pose says of each cell; a named tuple, because kernels take one as it is.
+
+    `extents` (N, 2) is trace C of the rest covariance C, and its inverse or 0. `axes` (N, 6) are
+    two orthonormal rest directions that span the cell's edges best, and `shares` (N, 4), for each
+    of them, the inverse root of its extent, damped, and what the damping took away.
+    """
+
+    extents: Floats
+    axes: Floats
+    shares: Floats
+
+
+class Shell(NamedTuple):
+    """The closed surfaces whose volumes are kept; a named tuple, because kernels take one as it is.
+
+    Faces (F, 3) lie component by component, with fans over holes, which have no area; chunk c is
+    the faces from `chunks[c]` to `chunks[c + 1]`, all of the component `parts[c]`, whose volume is
+    taken from its vertex `origins[c]`. Around vertex i lie the `pairs` (3 F', 2) from `corners[i]`
+    to `corners[i + 1]`: the other two vertices of each of its faces, in order, without the fans.
+    """
+
+    faces: NDArray[np.uint32]
+    areas: Floats
+    chunks: NDArray[np.int64]
+    parts: NDArray[np.int64]
+    origins: NDArray[np.uint32]
+    corners: NDArray[np.uint32]
+    pairs: NDArray[np.uint32]
+
+
+class Fit(NamedTuple):
+    """What a local step writes; a named tuple, because kernels take one as it is.
+
+    `matrices` (N, 9) are the cells' s R or V R, `scales` (N,) their scales, `laplace_x` (N, 3) is
+    L x, and `room` (threads, SCRATCH) is what each thread works in.
+    """
+
+    matrices: Floats
+    scales: Floats
+    laplace_x: Floats
+    room: Floats
+
+
+@kernel
+def _covariances(x: Floats, cells: Cells, first: int, lanes: Floats, laplace_x: Floats) -> None:
+    """The covariances S of LANES cells into rows 0 to 8 of `lanes`; L x on the way."""
+    starts, neighbours, fits = cells.starts, cells.neighbours, cells.fits
+    for k in range(min(LANES, len(starts) - 1 - first)):
+        i = np.uint64(first + k)
+        x0, x1, x2 = x[i, 0], x[i, 1], x[i, 2]
+        s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = s8 = 0.0
+        l0 = l1 = l2 = 0.0
+        for h in range(np.uint64(starts[i]), np.uint64(starts[i + np.uint64(1)])):
+            j = np.uint64(neighbours[h])
+            d0, d1, d2 = x[j, 0] - x0, x[j, 1] - x1, x[j, 2] - x2
+            u0, u1, u2, w = fits[h, 0], fits[h, 1], fits[h, 2], fits[h, 3]
+            s0 += d0 * u0
+            s1 += d0 * u1
+            s2 += d0 * u2
+            s3 += d1 * u0
+            s4 += d1 * u1
+            s5 += d1 * u2
+            s6 += d2 * u0
+            s7 += d2 * u1
+            s8 += d2 * u2
+            l0 -= w * d0
+            l1 -= w * d1
+            l2 -= w * d2
+        lanes[k], lanes[LANES + k], lanes[2 * LANES + k] = s0, s1, s2
+        lanes[3 * LANES + k], lanes[4 * LANES + k], lanes[5 * LANES + k] = s3, s4, s5
+        lanes[6 * LANES + k], lanes[7 * LANES + k], lanes[8 * LANES + k] = s6, s7, s8
+        laplace_x[i, 0], laplace_x[i, 1], laplace_x[i, 2] = l0, l1, l2
+
+
+@parallel_kernel
+def rest_covariances(rest: Floats, cells: Cells, out: Fit) -> None:
+    """The covariance of each cell's edges at rest, into out.matrices."""
+    matrices, _, laplace_x, room = out  # numba loses what is written through the tuple
+    count = len(cells.starts) - 1
+    for block in prange((count + LANES - 1) // LANES):
+        lanes, first = room[get_thread_id()], block * LANES
+        _covariances(rest, cells, first, lanes, laplace_x)
+        for k in range(min(LANES, count - first)):
+            for entry in range(9):
+                matrices[first + k, entry] = lanes[entry * LANES + k]
+
+
+@parallel_kernel
+def fit_scaled_cells(x: Floats, cells: Cells, planes: Planes, cartoon: float, out: Fit) -> None:
+    """The shape state's local step: s_i R_i of each cell, s_i drawn to one by 1 - cartoon.
+
+    Source: Celikcan et al. 2015, eqs. (5), (6) and (8).
+    """
+    matrices, scales, laplace_x, room = out
+    count = len(cells.starts) - 1
+    for block in prange((count + LANES - 1) // LANES):
+        lanes, first = room[get_thread_id()], block * LANES
+        size = min(LANES, count - first)
+        _covariances(x, cells, first, lanes, laplace_x)
+        fit_rotations(lanes, size)
+        for k in range(size):
+            i = first + k
+            trace = 0.0
+            for entry in range(9):
+                trace += lanes[entry * LANES + k] * lanes[_R + entry * LANES + k]
+            s = 1.0 + (trace - planes.extents[i, 0]) * planes.extents[i, 1]
+            s = 1.0 + cartoon * (min(max(s, LEAST_SCALE), LARGEST_SCALE) - 1.0)
+            scales[i] = s
+            for entry in range(9):
+                matrices[i, entry] = s * lanes[_R + entry * LANES + k]
+
+
+@parallel_kernel
+def fit_pose_cells(x: Floats, cells: Cells, planes: Planes, gain: float, out: Fit) -> None:
+    """The pose state's local step: V_i R_i of each cell, and the scale on its primary axis.
+
+    Source: Celikcan et al. 2015, eqs. (8) and (10) to (12), the axis from the stretch in the
+    cell's plane; see `solvers.squash_stretch`.
+    """
+    matrices, scales, laplace_x, room = out
+    count = len(cells.starts) - 1
+    for block in prange((count + LANES - 1) // LANES):
+        lanes, first = room[get_thread_id()], block * LANES
+        _covariances(x, cells, first, lanes, laplace_x)
+        fit_rotations(lanes, min(LANES, count - first))
+        for k in range(min(LANES, count - first)):
+            i = first + k
+            axes = planes.axes[i]
+            faa, fab, fbb = _stretch(lanes, k, axes, planes.shares[i])
+            s, q, aa, ab, bb = _soft_axis(faa, fab, fbb)
+            scales[i] = s
+            along, across = _volume_scales(s, q, gain)
+            for row in range(3):
+                ra = rb = 0.0
+                for column in range(3):
+                    turn = lanes[_R + (3 * row + column) * LANES + k]
+                    ra += turn * axes[column]
+                    rb += turn * axes[3 + column]
+                pa, pb = (
+                    (along - across) * (ra * aa + rb * ab),
+                    (along - across) * (ra * ab + rb * bb),
+                )
+                for column in range(3):
+                    turn = lanes[_R + (3 * row + column) * LANES + k]
+                    matrices[i, 3 * row + column] = (
+                        across * turn + pa * axes[column] + pb * axes[3 + column]
+                    )
+
+
+@kernel
+def _stretch(lanes: Floats, k: int, axes: Floats, shares: Floats) -> tuple[float, float, float]:
+    """The stretch of cell k in its rest plane, as a symmetric matrix (aa, ab, bb); I at rest."""
+    wa, wb = shares[0], shares[1]
+    faa, fab, fbb = shares[2], 0.0, shares[3]
+    for row in range(3):
+        ra = rb = sa = sb = 0.0  # the rest axes as R takes them, and as S does
+        for column in range(3):
+            entry = (3 * row + column) * LANES + k
+            a, b = axes[column], axes[3 + column]
+            ra += lanes[_R + entry] * a
+            rb += lanes[_R + entry] * b
+            sa += lanes[entry] * a
+            sb += lanes[entry] * b
+        faa += wa * wa * ra * sa
+        fab += 0.5 * wa * wb * (ra * sb + rb * sa)
+        fbb += wb * wb * rb * sb
+    return faa, fab, fbb
+
+
+@kernel
+def _volume_scales(s: float, q: float, gain: float) -> tuple[float, float]:
+    """The scales along and across the primary axis, g and c, of V = c I + (g - c) W.
+
+    Source: Celikcan et al. 2015, eqs. (10) and (12), with s' = 1 + gain (s - 1).
+    """
+    g = min(max(1.0 + gain * (s - 1.0), LEAST_SCALE), LARGEST_SCALE)
+    c = 1.0 / math.sqrt(g)
+    # det V = c (c + (g - c) q) (c + (g - c) (1 - q)) is one for a hard axis, and is made one.
+    volume = c * (c * g + (g - c) * (g - c) * q * (1.0 - q))
+    even = volume ** (-1.0 / 3.0)
+    return even * g, even * c
+
+
+@kernel
+def _soft_axis(faa: float, fab: float, fbb: float) -> tuple[float, float, float, float, float]:
+    """The scale s on the primary axis of a stretch [[faa, fab], [fab, fbb]], its hardness q, and W.
+
+    With the eigenvectors u and v, the axis is W = q u u^T + (1 - q) v v^T, given as (aa, ab, bb);
+    q is the share of the larger strain in the sum of both, each to the power of 16. It is one but
+    where both strains are nearly as large: there an axis would flicker.
+    """
+    middle, half = 0.5 * (faa + fbb), 0.5 * (faa - fbb)
+    radius = math.sqrt(half * half + fab * fab)
+    f = min(max(middle + radius, LEAST_SCALE), LARGEST_SCALE)
+    h = min(max(middle - radius, LEAST_SCALE), LARGEST_SCALE)
+    # (f - 1/f) / 2 is nearly log f: half the length weighs as much as twice.
+    first, second = (f - 1.0 / f) * (f - 1.0 / f), (h - 1.0 / h) * (h - 1.0 / h)
+    largest = max(first, second, _TINY)
+    first, second = first / largest, second / largest
+    for _ in range(3):
+        first, second = first * first, second * second
+    q = first / (first + second) if first + second > 0.0 else 0.5
+    lean = (q - 0.5) / radius if radius > 1e-12 else 0.0
+    s = q * f + (1.0 - q) * h
+    return s, q, 0.5 + lean * half, lean * fab, 0.5 - lean * half
+
+
+@parallel_kernel
+def push(x: Floats, shell: Shell, scales: Floats, fixed: NDArray[np.bool_], out: Floats) -> None:
+    """How a pressure pushes the vertices, out (N, 3): area vectors times the strain of their cells.
+
+    An area vector is the gradient of the volume; the strain |s - 1/s| / 2 is zero where nothing is
+    squashed. Fixed vertices are not pushed.
+    """
+    corners, pairs = shell.corners, shell.pairs
+    for index in prange(len(out)):
+        i = np.uint64(index)
+        a0 = a1 = a2 = 0.0
+        if not fixed[i]:
+            x0, x1, x2 = x[i, 0], x[i, 1], x[i, 2]
+            for h in range(np.uint64(corners[i]), np.uint64(corners[i + np.uint64(1)])):
+                j, k = np.uint64(pairs[h, 0]), np.uint64(pairs[h, 1])
+                b0, b1, b2 = x[j, 0] - x0, x[j, 1] - x1, x[j, 2] - x2
+                c0, c1, c2 = x[k, 0] - x0, x[k, 1] - x1, x[k, 2] - x2
+                a0 += b1 * c2 - b2 * c1
+                a1 += b2 * c0 - b0 * c2
+                a2 += b0 * c1 - b1 * c0
+            strain = abs(scales[i] - 1.0 / scales[i]) / 12.0
+            a0, a1, a2 = a0 * strain, a1 * strain, a2 * strain
+        out[i, 0], out[i, 1], out[i, 2] = a0, a1, a2
+
+
+@parallel_kernel
+def volume_terms(x: Floats, g: Floats, shell: Shell, scales: Floats, out: Floats) -> None:
+    """What each chunk of the shell adds to its component's volume, out (chunks, 6).
+
+    Columns 0 to 3 are the volume of x + m g as a polynomial in m, constant first; 4 and 5 the rest
+    areas times the strain |s - 1/s| / 2 of the cells on them, and times (1/s - s) / 2, with sign.
+    """
+    faces, chunks, origins, areas = shell.faces, shell.chunks, shell.origins, shell.areas
+    for chunk in prange(len(chunks) - 1):
+        origin = np.uint64(origins[chunk])
+        p = np.empty((6, 3))
+        t0 = t1 = t2 = t3 = strained = squashed = 0.0
+        for face in range(chunks[chunk], chunks[chunk + 1]):
+            strain = 0.0
+            for corner in range(3):
+                v = np.uint64(faces[face, corner])
+                for axis in range(3):
+                    p[corner, axis] = x[v, axis] - x[origin, axis]
+                    p[3 + corner, axis] = g[v, axis]
+                s = scales[v]
+                strain += 1.0 / s - s
+                strained += areas[face] * abs(1.0 / s - s) / 6.0
+            squashed += areas[face] * strain / 6.0
+            t0 += _triple(p, 0, 1, 2)
+            t1 += _triple(p, 3, 1, 2) + _triple(p, 0, 4, 2) + _triple(p, 0, 1, 5)
+            t2 += _triple(p, 3, 4, 2) + _triple(p, 3, 1, 5) + _triple(p, 0, 4, 5)
+            t3 += _triple(p, 3, 4, 5)
+        out[chunk, 0], out[chunk, 1], out[chunk, 2], out[chunk, 3] = t0, t1, t2, t3
+        out[chunk, 4], out[chunk, 5] = strained, squashed
+
+
+@kernel
+def _triple(p: Floats, i: int, j: int, k: int) -> float:
+    """A sixth of the triple product of three rows: the volume over a triangle."""
+    return float(
+        (
+            p[i, 0] * (p[j, 1] * p[k, 2] - p[j, 2] * p[k, 1])
+            + p[i, 1] * (p[j, 2] * p[k, 0] - p[j, 0] * p[k, 2])
+            + p[i, 2] * (p[j, 0] * p[k, 1] - p[j, 1] * p[k, 0])
+        )
+        / 6.0
+    )
+
+
+@parallel_kernel
+def add_scaled(pressures: Floats, part_of: NDArray[np.int64], g: Floats, x: Floats) -> None:
+    """Move each vertex of x (N, 3) along g (N, 3) by the pressure in its component."""
+    for i in prange(len(part_of)):
+        m = pressures[part_of[i]]
+        x[i, 0] += m * g[i, 0]
+        x[i, 1] += m * g[i, 1]
+        x[i, 2] += m * g[i, 2]
+
+
+@kernel
+def sum_parts(terms: Floats, parts: NDArray[np.int64], out: Floats) -> None:
+    """The terms of chunks (chunks, 6), each of the component in `parts`, summed into out (C, 6)."""
+    out[:] = 0.0
+    for chunk in range(len(parts)):
+        for term in range(6):
+            out[parts[chunk], term] += terms[chunk, term]
+
+
+@kernel
+def find_pressures(sums: Floats, rest: Floats, shape: Floats, gain: float, out: Floats) -> None:
+    """The pressure m in each component, out (C,), that gives its volume back, or `gain` of it.
+
+    From the sums (C, 6) of `volume_terms`, the volumes and areas at rest (C, 2), and the volumes of
+    the shape state (C,), which lead the way beyond one: what the shape state lost, gained.
+    """
+    for part in range(len(out)):
+        out[part] = 0.0
+        slope, volume = sums[part, 1], rest[part, 0]
+        if not slope > 1e-12 * abs(volume):
+            continue
+        wanted = min(gain, 1.0) * (volume - sums[part, 0])
+        if gain > 1.0:
+            ratio = min(max(volume / shape[part], 0.25), 4.0) if shape[part] != 0.0 else 1.0
+            wanted = volume * ratio ** (0.5 * (gain - 1.0)) - sums[part, 0]
+        strain = sums[part, 4] / max(rest[part, 1], _TINY)
+        most = _MOST * max(gain, 1.0) * abs(volume) * strain
+        wanted = min(max(wanted, -most), most)
+        out[part] = _first_root(slope, sums[part, 2], sums[part, 3], wanted)
+
+
+@kernel
+def _first_root(slope: float, curve: float, twist: float, wanted: float) -> float:
+    """Where slope m + curve m^2 + twist m^3 is `wanted`, or as near as it comes before it turns."""
+    # Beyond here it has lost its slope but for a quarter, and is about to turn.
+    lost = 0.75 * slope
+    bend = curve if wanted > 0.0 else -curve
+    spread = bend * bend - 3.0 * twist * lost
+    falling = math.sqrt(spread) - bend if spread > 0.0 else 0.0
+    farthest = lost / falling if falling > 0.0 else 4.0 * abs(wanted) / slope
+    m = 0.0
+    for _ in range(8):
+        tangent = slope + m * (2.0 * curve + 3.0 * twist * m)
+        m -= (m * (slope + m * (curve + twist * m)) - wanted) / max(tangent, 0.2 * slope)
+        m = min(max(m, -farthest), farthest)
+    return m

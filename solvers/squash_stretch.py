@@ -1,0 +1,209 @@
+"""Squash and stretch: a surface whose cells scale and keep their volume.
+
+Celikcan, Yaz and Capin 2015, section 4. Two states share one factor:
+
+- The shape state. Cells rotate and scale uniformly, eqs. (4) to (9). It is what goes on from frame
+  to frame; nothing of the pose ever comes back into it, so nothing drifts.
+- The pose state, once a frame. Each cell is squashed along its primary axis by what the shape state
+  found there, and swells across it so that its volume stays: eqs. (10) to (13).
+
+Where the paper is left, and why:
+
+- The primary axis is sought in the cell's own plane, as the larger of the two principal stretches
+  of its rest edges, in place of the first eigenvector of eq. (11). They are the same where a cell
+  is stretched; where it is only bent, eq. (11) finds the normal, and along it no edge has a length
+  to be scaled. It is a closed form on two by two numbers.
+- Where both stretches are nearly as large, which is where energy (4) leads to (a conformal map is
+  free), an axis would flicker: the scale is then shared between both axes, smoothly.
+- What the pose still lacks in volume is given back by a pressure. Held ends, and cells that shrink
+  as they may in eq. (4), lose a third of the volume of a squashed box whatever eq. (13) asks for.
+  The pressure acts where cells are squashed or stretched and nowhere else, in proportion to the
+  strain, so that the parts at rest stay as they are: no balloon effect (the paper's figure 6).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from solvers.arap import ArapSolver
+from solvers.arap_cells import SPOKES
+from solvers.laplacian import Floats
+from solvers.squash_kernels import (
+    Fit,
+    Planes,
+    add_scaled,
+    find_pressures,
+    fit_pose_cells,
+    fit_scaled_cells,
+    push,
+    rest_covariances,
+    sum_parts,
+    volume_terms,
+)
+from solvers.squash_shell import build_shell
+
+# The least extent of a cell along its second axis, as a share of the first: a ring that is nearly a
+# line has no stretch across it to speak of.
+_THIN = 1e-3
+
+_LARGEST_GAIN = 10.0
+
+
+class SquashStretchSolver(ArapSolver):
+    """Deforms a surface like `ArapSolver`, but lets it squash and stretch, and keeps its volume.
+
+    Args:
+        vertices, faces, handles, energy, groups, weights: as of `ArapSolver`.
+        volume_gain: how much of the volume that squash and stretch would cost is kept, the paper's
+            lambda_v: 0 none, 1 all of it, more for exaggeration; may be changed between solves.
+        cartoon: 0 for the rigid answer of `ArapSolver`, bit for bit, 1 for squash and stretch, or
+            anything between; may be changed between solves.
+
+    Raises:
+        ValueError: as `ArapSolver`, and for a gain outside [0, 10] or a cartoon outside [0, 1].
+
+    Source: Celikcan, Yaz and Capin 2015, section 4.
+    """
+
+    def __init__(
+        self,
+        vertices: ArrayLike,
+        faces: ArrayLike,
+        handles: ArrayLike,
+        *,
+        energy: str = SPOKES,
+        groups: ArrayLike | None = None,
+        weights: ArrayLike | None = None,
+        volume_gain: float = 1.0,
+        cartoon: float = 1.0,
+    ) -> None:
+        self.volume_gain = volume_gain
+        self.cartoon = cartoon
+        super().__init__(vertices, faces, handles, energy=energy, groups=groups, weights=weights)
+        count = len(self._rest)
+        self._cell_scales, self._scales = np.ones(count), np.ones(count)
+        self._VR = np.empty((count, 9))
+        rest = Fit(self._VR, self._scales, self._laplace_x, self._room)
+        rest_covariances(self._rest, self._mesh.cells, rest)
+        self._planes = _planes(self._VR.reshape(-1, 3, 3))
+        self._shell = build_shell(self._rest, self._layout.faces, self._layout.parts)
+        parts = int(self._layout.parts.max()) + 1
+        self._pose = self._rest.copy()
+        self._push = np.zeros((count, 3))
+        self._swell = np.zeros((count, 3))
+        self._chunk_terms = np.zeros((len(self._shell.parts), 6))
+        self._sums = np.zeros((parts, 6))
+        self._shape_volumes = np.zeros(parts)
+        self._pressures = np.zeros(parts)
+        self._rest_sizes = self._measure_rest()
+
+    @property
+    def volume_gain(self) -> float:
+        """How much of the lost volume is kept: 0 none, 1 all, more for exaggeration."""
+        return self._volume_gain
+
+    @volume_gain.setter
+    def volume_gain(self, gain: float) -> None:
+        if not 0.0 <= gain <= _LARGEST_GAIN:
+            raise ValueError(f"expected a volume_gain in [0, {_LARGEST_GAIN:g}], got {gain}")
+        self._volume_gain = float(gain)
+
+    @property
+    def cartoon(self) -> float:
+        """How much cells may scale: 0 is rigid, 1 is squash and stretch."""
+        return self._cartoon
+
+    @cartoon.setter
+    def cartoon(self, share: float) -> None:
+        if not 0.0 <= share <= 1.0:
+            raise ValueError(f"expected a cartoon in [0, 1], got {share}")
+        self._cartoon = float(share)
+
+    def solve(
+        self, targets: ArrayLike, iterations: int = 1, *, out: Floats | None = None
+    ) -> Floats:
+        """Vertices (N, 3) that bring the handles to `targets` (H, 3), the hard ones exactly.
+
+        The last iteration is the pose state's, those before are the shape state's; a single one
+        stands for one of each. Zero gives the start itself. `out` as of `ArapSolver.solve`.
+
+        Raises:
+            ValueError: as of `ArapSolver.solve`.
+        """
+        if self._cartoon > 0.0 and iterations > 1:
+            iterations -= 1
+        return super().solve(targets, iterations, out=out)
+
+    def rotations(self) -> Floats:
+        """How each vertex's cell was turned by the last iteration, without its scale, (N, 3, 3)."""
+        scaled = super().rotations()
+        return scaled / self._cell_scales[self._layout.place][:, None, None]
+
+    @property
+    def scales(self) -> Floats:
+        """By how much each vertex's cell is squashed or stretched on its primary axis, (N,)."""
+        return self._scales[self._layout.place]
+
+    def _local_step(self, x: Floats) -> None:
+        if self._cartoon == 0.0:
+            super()._local_step(x)
+        else:
+            fit = Fit(self._R, self._cell_scales, self._laplace_x, self._room)
+            fit_scaled_cells(x, self._mesh.cells, self._planes, self._cartoon, fit)
+
+    def _pose_step(self) -> Floats:
+        """The pose state: from the shape state's x, which it leaves, the surface to show."""
+        if self._cartoon == 0.0:
+            return self._x
+        gain = self._volume_gain * self._cartoon
+        fit = Fit(self._VR, self._scales, self._laplace_x, self._room)
+        fit_pose_cells(self._x, self._mesh.cells, self._planes, gain, fit)
+        shape, sR = self._x, self._R
+        self._pose[:] = shape
+        self._x, self._R = self._pose, self._VR
+        self._global_step()
+        self._x, self._R = shape, sR
+        if gain > 0.0:
+            self._keep_volume(gain)
+        return self._pose
+
+    def _keep_volume(self, gain: float) -> None:
+        """Swell the pose where it is squashed, and draw it in where it is stretched."""
+        self._swell[:] = 0.0
+        if gain > 1.0:
+            self._measure(self._x)
+            self._shape_volumes[:] = self._sums[:, 0]
+        push(self._pose, self._shell, self._scales, self._system.held.fixed, self._push)
+        self._system.add_solution(self._push, self._swell)
+        self._measure(self._pose)
+        find_pressures(self._sums, self._rest_sizes, self._shape_volumes, gain, self._pressures)
+        add_scaled(self._pressures, self._layout.parts, self._swell, self._pose)
+
+    def _measure(self, x: Floats) -> None:
+        """Sum the volume terms of each component at x (N, 3)."""
+        volume_terms(x, self._swell, self._shell, self._scales, self._chunk_terms)
+        sum_parts(self._chunk_terms, self._shell.parts, self._sums)
+
+    def _measure_rest(self) -> Floats:
+        """Each component's volume and area at rest, (C, 2)."""
+        self._measure(self._rest)
+        part_of_face = self._layout.parts[self._shell.faces[:, 0]]
+        areas = np.bincount(part_of_face, self._shell.areas, minlength=len(self._sums))
+        return np.column_stack([self._sums[:, 0], areas])
+
+
+def _planes(C: Floats) -> Planes:
+    """What the two states need to know of the cells, from their covariances at rest (N, 3, 3)."""
+    values, vectors = np.linalg.eigh(0.5 * (C + C.transpose(0, 2, 1)))
+    extents = np.trace(C, axis1=1, axis2=2)
+    inverse = np.divide(1.0, extents, out=np.zeros_like(extents), where=extents > 1e-200)
+    largest = np.maximum(values[:, 2], 0.0)
+    pair = np.maximum(values[:, [2, 1]], 0.0)
+    damped = pair + _THIN * largest[:, None]
+    weights = np.divide(1.0, np.sqrt(damped), out=np.zeros_like(pair), where=damped > 1e-200)
+    return Planes(
+        extents=np.column_stack([extents, inverse]),
+        axes=np.concatenate([vectors[:, :, 2], vectors[:, :, 1]], axis=1),
+        shares=np.concatenate([weights, 1.0 - weights**2 * pair], axis=1),
+    )
