@@ -37,6 +37,7 @@ class ClockMap:
         fall. A stamp that is no number, or as large as none is, is taken for the arrival.
         """
         if not abs(device) < LARGEST:  # NaN is not
+            self._last_host = max(self._last_host, arrival)
             return arrival
         offset = arrival - device
         if self._began is None:
