@@ -154,7 +154,8 @@ class BridgeReceiver:
             return []
         self.lost += sample.sequence - self._came - 1
         self._came = sample.sequence
-        time = self._rising(sample.frame.performer, sample.frame.time - self.clock.seconds)
+        time = min(sample.frame.time - self.clock.seconds, arrival)
+        time = self._rising(sample.frame.performer, time)
         return [replace(sample.frame, time=time, arrival=arrival)]
 
     def _fits(self, sample: Sample) -> bool:

@@ -140,6 +140,17 @@ def _add_show_options(parser: argparse.ArgumentParser) -> None:
         metavar="HOST:PORT",
         help="send the performer as VMC; its receivers listen on port 39539",
     )
+    keep.add_argument(
+        "--publish",
+        metavar="tcp://HOST:PORT",
+        help="the performer for other shows, which open zmq+tcp://HOST:PORT",
+    )
+    keep.add_argument(
+        "--publish-keys",
+        type=Path,
+        metavar="DIR",
+        help="for --publish beyond this machine; `bunraku bridge --make-keys` makes them",
+    )
 
 
 CONDITIONING = {

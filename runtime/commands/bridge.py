@@ -18,7 +18,7 @@ from devices.stream import SkeletonStream, open_stream
 from replay.recorded_stream import RecordedStream
 from runtime.clock import Ticker
 from runtime.interrupt import held
-from runtime.output.bridge_publisher import BridgePublisher, binding
+from runtime.output.bridge_publisher import Binding, BridgePublisher, binding
 
 POLLS = 240.0  # a second: twice the fastest sensor; what has a thread of its own does not wait
 
@@ -34,9 +34,9 @@ def bridge(options: argparse.Namespace) -> int:
     if options.device is None:
         raise InputError("a bridge needs --device URL, as `bunraku devices` lists them")
     with open_stream(options.device) as stream:
-        publisher = open_publisher(options.bind, options.keys, stream.skeleton)
+        where = binding(options.bind, options.keys, option=f"--keys DIR/{CAPTURE}")
+        publisher = open_publisher(where, stream.skeleton)
         try:
-            say(f"bridging {options.device} at {publisher.endpoint}")
             _carry(stream, publisher, options.seconds or math.inf)
         finally:
             with held():
@@ -47,14 +47,15 @@ def bridge(options: argparse.Namespace) -> int:
     return 0
 
 
-def open_publisher(bind: str, keys: Path | None, skeleton: Skeleton) -> BridgePublisher:
-    """A publisher that tells the operator who comes and goes.
+def open_publisher(where: Binding, skeleton: Skeleton) -> BridgePublisher:
+    """A publisher that tells the operator where it is, and who comes and goes.
 
     Raises:
-        InputError: the address cannot be bound, or it is beyond this machine and there are no keys.
+        InputError: the address cannot be bound.
     """
-    where = binding(bind, keys, option=f"--keys DIR/{CAPTURE}")
-    return BridgePublisher(where, skeleton, tell=say)
+    publisher = BridgePublisher(where, skeleton, tell=say)
+    say(f"sending to whoever opens zmq+{publisher.endpoint}")
+    return publisher
 
 
 def say(line: str) -> None:

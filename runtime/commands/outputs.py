@@ -11,6 +11,9 @@ from pathlib import Path
 
 from devices.errors import InputError
 from runtime.character import Character
+from runtime.commands.bridge import open_publisher
+from runtime.output.bridge_performer import BridgePerformer
+from runtime.output.bridge_publisher import Binding, binding
 from runtime.output.export import SUFFIXES, open_export
 from runtime.output.frames import Frames
 from runtime.output.output import Output
@@ -27,8 +30,8 @@ def check_outputs(options: argparse.Namespace) -> None:
     """Make sure that every file of a show can be written, each once and over nothing it reads.
 
     Raises:
-        InputError: a folder is missing, a file cannot be written, a suffix is not known, or two
-            options name one file.
+        InputError: a folder is missing, a file cannot be written, a suffix is not known, two
+            options name one file, or what is published beyond this machine is not guarded.
     """
     read = list(_read(options))
     written = list(_written(options))
@@ -36,6 +39,8 @@ def check_outputs(options: argparse.Namespace) -> None:
         check_writable(path / "000000.png" if option == "--frames" and path.is_dir() else path)
     if options.video is not None:
         encoder_for(options.video)
+    if options.publish is not None:
+        _publishing(options)
     if options.export is not None:
         check_suffix(options.export, SUFFIXES)
     for (option, path), (other, taken) in itertools.combinations(read + written, 2):
@@ -80,10 +85,17 @@ def open_outputs(
         outputs[0].append(closing.enter_context(video))
     if options.frames is not None:
         outputs[0].append(closing.enter_context(Frames(options.frames)))
+    if options.publish is not None:
+        publisher = open_publisher(_publishing(options), performer.skeleton)
+        outputs[0].append(closing.enter_context(BridgePerformer(performer, publisher)))
     if options.vmc is not None:
         host, port = options.vmc
         outputs[0].append(closing.enter_context(VmcPerformer(performer, host, port or VMC_PORT)))
     return outputs
+
+
+def _publishing(options: argparse.Namespace) -> Binding:
+    return binding(options.publish, options.publish_keys, option="--publish-keys DIR/capture")
 
 
 def _read(options: argparse.Namespace) -> Iterator[tuple[str, Path]]:
