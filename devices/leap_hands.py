@@ -23,12 +23,18 @@ Array = NDArray[np.float64]
 
 FARTHEST_MM = 1e5
 _PLACES = {"elbow": "elbow", "wrist": "wrist", PALM: "palmPosition"}
-_ENDS = {
-    finger: [name for name in HAND_PARENTS if name.startswith(f"{finger}_")] for finger in FINGERS
-}
 # The bone that starts at a joint, of the four of a finger: metacarpal, proximal, intermediate,
 # distal. The tip, where none starts, keeps the turn of the last.
 _BONE_FROM = {"mcp": 1, "pip": 2, "dip": 3, "tip": 3}
+# Of each finger: its joints, the name of each in a message, and the bone that starts there.
+_ENDS = [
+    [
+        (name, f"{name.removeprefix(finger + '_')}Position", _BONE_FROM[name.rpartition("_")[2]])
+        for name in HAND_PARENTS
+        if name.startswith(f"{finger}_")
+    ]
+    for finger in FINGERS
+]
 _SQUARE = 0.05  # how far a basis may be from orthonormal and still be one
 
 
@@ -71,29 +77,34 @@ class LeapFrame:
 
 def leap_frame(message: Mapping[str, Any]) -> LeapFrame:
     """The frame that a decoded message shows; hands without a palm are left out."""
-    hands = {hand.id: hand for hand in map(_hand, _objects(message.get("hands")))}
+    found = {hand.id: hand for hand in map(_found, _objects(message.get("hands")))}
     for pointable in _objects(message.get("pointables")):
-        hand = hands.get(_whole(pointable.get("handId")))
-        if hand is not None and pointable.get("tool") is not True:
-            _add_finger(hand, pointable)
+        of = found.get(_whole(pointable.get("handId")))
+        if of is not None and pointable.get("tool") is not True:
+            _add_finger(of, pointable)
+    hands = [_hand(hand) for hand in found.values()]
     return LeapFrame(
         timestamp=number(message.get("timestamp")),
         rate=number(message.get("currentFrameRate")),
-        hands=[hand for hand in hands.values() if PALM in hand.joints],
+        hands=[hand for hand in hands if PALM in hand.joints],
     )
 
 
-def palm_basis(direction: Array, normal: Array) -> Array | None:
-    """Axes (3, 3) of a palm: across it, up out of its back, back from the fingers; or None."""
-    return rotation(np.stack([np.cross(normal, direction), -normal, -direction], axis=1))
+def palm_basis(direction: Array, normal: Array) -> Array:
+    """Axes (3, 3) of a palm: across it, up out of its back, back from the fingers; NaN where they
+    are not known."""
+    return np.stack([np.cross(normal, direction), -normal, -direction], axis=1)
 
 
-def rotation(basis: Array) -> Array | None:
-    """A basis (3, 3), its axes in columns, with the first axis turned round if it is left-handed;
-    None if it is none."""
-    if not np.abs(basis.T @ basis - np.eye(3)).max() < _SQUARE:
-        return None  # NaN, too
-    return basis * [-1.0, 1.0, 1.0] if np.linalg.det(basis) < 0 else basis
+def rotations(bases: Array) -> tuple[Array, NDArray[np.bool_]]:
+    """Bases (n, 3, 3), their axes in columns, as rotations: where one is left-handed its first axis
+    is turned round. The second result (n,) says which are bases at all."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        gram = np.swapaxes(bases, 1, 2) @ bases
+        known: NDArray[np.bool_] = (np.abs(gram - np.eye(3)) < _SQUARE).all(axis=(1, 2))
+    turned = bases.copy()
+    turned[known & (np.linalg.det(np.where(known[:, None, None], bases, 0.0)) < 0.0), :, 0] *= -1.0
+    return turned, known
 
 
 def number(value: Any) -> float | None:
@@ -104,65 +115,97 @@ def number(value: Any) -> float | None:
     return found if math.isfinite(found) else None
 
 
-def _hand(found: Mapping[str, Any]) -> Hand:
-    confidence = number(found.get("confidence"))
-    side = found.get("type")
-    hand = Hand(
-        id=_whole(found.get("id")),
-        side=side if side in SIDES else None,
-        confidence=1.0 if confidence is None else min(max(confidence, 0.0), 1.0),
-        joints=_seen({name: found.get(key) for name, key in _PLACES.items()}),
-        direction=_vector(found.get("direction")),
-        normal=_vector(found.get("palmNormal")),
+@dataclass(slots=True)
+class _Found:
+    """A hand's vectors as JSON has them, by joint, until all of them are made arrays at once."""
+
+    hand: dict[str, Any]
+    id: int
+    places: dict[str, Any]
+    axes: dict[str, Any]
+    tips: list[Tip] = field(default_factory=list)
+
+
+def _found(hand: dict[str, Any]) -> _Found:
+    arm = hand.get("armBasis")
+    return _Found(
+        hand=hand,
+        id=_whole(hand.get("id")),
+        places={name: hand.get(key) for name, key in _PLACES.items()},
+        axes={"elbow": arm, "wrist": arm},
     )
-    arm = _basis(found.get("armBasis"))
-    turns = {PALM: palm_basis(hand.direction, hand.normal), "wrist": arm, "elbow": arm}
-    hand.bases = {name: turn for name, turn in turns.items() if turn is not None}
-    return hand
 
 
-def _add_finger(hand: Hand, pointable: Mapping[str, Any]) -> None:
-    tip = _vector(pointable.get("tipPosition"))
+def _add_finger(found: _Found, pointable: Mapping[str, Any]) -> None:
     if "mcpPosition" not in pointable:
-        if np.isfinite(tip).all():
-            hand.tips.append(Tip(_whole(pointable.get("id")), tip))
+        tip = _vector(pointable.get("tipPosition"))
+        if tip is not None:
+            found.tips.append(Tip(_whole(pointable.get("id")), np.array(tip)))
         return
     kind = _whole(pointable.get("type"))
     if kind < 0:  # the packed form leaves it out; ids are 10 * hand + finger
         kind = _whole(pointable.get("id")) % 10
     if kind >= len(FINGERS):
         return
-    finger = FINGERS[kind]
-    ends = {name: name.removeprefix(f"{finger}_") for name in _ENDS[finger]}
-    hand.joints.update(_seen({name: pointable.get(f"{e}Position") for name, e in ends.items()}))
     bones = pointable.get("bases")
-    if isinstance(bones, list) and len(bones) == 4:
-        for name, end in ends.items():
-            turn = _basis(bones[_BONE_FROM[end]])
-            if turn is not None:
-                hand.bases[name] = turn
+    several = isinstance(bones, list) and len(bones) == 4
+    for name, key, bone in _ENDS[kind]:
+        found.places[name] = pointable.get(key)
+        if several:
+            found.axes[name] = bones[bone]  # type: ignore[index]
+
+
+def _hand(found: _Found) -> Hand:
+    confidence = number(found.hand.get("confidence"))
+    side = found.hand.get("type")
+    direction, normal = (
+        np.array(_vector(found.hand.get(key)) or (np.nan,) * 3)
+        for key in ("direction", "palmNormal")
+    )
+    return Hand(
+        id=found.id,
+        side=side if side in SIDES else None,
+        confidence=1.0 if confidence is None else min(max(confidence, 0.0), 1.0),
+        joints=_joints(found.places),
+        direction=direction,
+        normal=normal,
+        tips=found.tips,
+        bases=_bases(found.axes, palm_basis(direction, normal)),
+    )
+
+
+def _joints(places: Mapping[str, Any]) -> dict[str, Array]:
+    seen = {name: _vector(place) for name, place in places.items()}
+    names = [name for name, place in seen.items() if place is not None]
+    return dict(zip(names, np.array([seen[name] for name in names]), strict=True))
+
+
+def _bases(axes: Mapping[str, Any], palm: Array) -> dict[str, Array]:
+    names, found = [PALM], [palm.T.tolist()]
+    for name, basis in axes.items():
+        vectors = [_vector(axis) for axis in basis] if isinstance(basis, list) else []
+        if len(vectors) == 3 and None not in vectors:
+            names.append(name)
+            found.append(vectors)
+    turned, known = rotations(np.swapaxes(np.array(found), 1, 2))
+    return {name: turned[row] for row, name in enumerate(names) if known[row]}
 
 
 def _objects(found: Any) -> list[dict[str, Any]]:
     return [item for item in found if isinstance(item, dict)] if isinstance(found, list) else []
 
 
-def _seen(vectors: Mapping[str, Any]) -> dict[str, Array]:
-    found = {name: _vector(value) for name, value in vectors.items()}
-    return {name: vector for name, vector in found.items() if np.isfinite(vector).all()}
-
-
-def _basis(value: Any) -> Array | None:
-    if not isinstance(value, list) or len(value) != 3:
+def _vector(value: Any) -> tuple[float, float, float] | None:
+    """Three numbers within reach, or None."""
+    if type(value) is not list or len(value) != 3:
         return None
-    return rotation(np.stack([_vector(axis) for axis in value], axis=1))
-
-
-def _vector(value: Any) -> Array:
-    numbers = [number(item) for item in value] if isinstance(value, list) else []
-    if len(numbers) != 3 or any(n is None or abs(n) > FARTHEST_MM for n in numbers):
-        return np.full(3, np.nan)
-    return np.array(numbers, dtype=np.float64)
+    x, y, z = value
+    if not (type(x) is float and type(y) is float and type(z) is float):
+        x, y, z = (number(item) for item in value)
+        if x is None or y is None or z is None:
+            return None
+    near = abs(x) <= FARTHEST_MM and abs(y) <= FARTHEST_MM and abs(z) <= FARTHEST_MM
+    return (x, y, z) if near else None  # NaN is not near
 
 
 def _whole(value: Any) -> int:

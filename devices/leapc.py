@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from devices.address import one_of, options_of
 from devices.clock_map import ClockMap
 from devices.errors import InputError
-from devices.leap_hands import FARTHEST_MM, Hand, palm_basis
+from devices.leap_hands import FARTHEST_MM, Hand, palm_basis, rotations
 from devices.leap_joints import FINGERS, HAND_PARENTS, PALM
 from devices.leap_performer import BOTH, LeapPerformer
 from devices.live_stream import LiveStream
@@ -193,7 +193,7 @@ def _hand(found: LeapHand) -> Hand:
     direction, normal = (
         np.array(axis, dtype=np.float64) for axis in (found.palm.direction, found.palm.normal)
     )
-    palm = palm_basis(direction, normal)
+    palm, known = rotations(palm_basis(direction, normal)[None])
     return Hand(
         id=found.id,
         side="left" if found.type == _LEFT else "right",
@@ -205,7 +205,7 @@ def _hand(found: LeapHand) -> Hand:
         },
         direction=direction,
         normal=normal,
-        bases=_bases(turns) | ({} if palm is None else {PALM: palm}),
+        bases=_bases(turns) | ({PALM: palm[0]} if known[0] else {}),
     )
 
 
