@@ -119,18 +119,46 @@ def _prepare(vertices: Floats, faces: Ints) -> _Mesh:
         mark=np.full(count, -1),
     )
     _link_corners(mesh)
+    _hold_borders(mesh)
     return mesh
+
+
+def _edge_uses(count: int, faces: Ints) -> tuple[Ints, Ints, Ints]:
+    """Every edge (E, 2), in how many faces it is (E,), and one of its half-edges (E,)."""
+    sides = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    keys, half, uses = np.unique(
+        sides[:, 0] * count + sides[:, 1], return_index=True, return_counts=True
+    )
+    return np.stack([keys // count, keys % count], axis=1), uses, half
 
 
 def _kinds(count: int, faces: Ints) -> Ints:
     """Whether a vertex is inside the surface, on its border, or on an edge of more than two."""
-    sides = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    keys, uses = np.unique(sides[:, 0] * count + sides[:, 1], return_counts=True)
+    edges, uses, _ = _edge_uses(count, faces)
     kind = np.full(count, _SMOOTH)
-    for uses_of_kind, value in ((uses == 1, _BORDER), (uses > 2, _LOCKED)):
-        kind[keys[uses_of_kind] // count] = value
-        kind[keys[uses_of_kind] % count] = value
+    kind[edges[uses == 1]] = _BORDER
+    kind[edges[uses > 2]] = _LOCKED
     return kind
+
+
+def _hold_borders(mesh: _Mesh) -> None:
+    """Keep border edges where they are by planes that stand on them; Garland and Heckbert, 6."""
+    edges, uses, half = _edge_uses(len(mesh.points), mesh.faces)
+    edges, half = edges[uses == 1], half[uses == 1]
+    tail, head = (mesh.points[edges[:, end]] for end in range(2))
+    a, b, c = (mesh.points[mesh.faces[half // 3, corner]] for corner in range(3))
+    across = np.cross(head - tail, np.cross(b - a, c - a))
+    lengths = np.linalg.norm(across, axis=1, keepdims=True)
+    normal = across / np.where(lengths > 0.0, lengths, 1.0)
+    plane = np.column_stack([normal, -np.einsum("ij,ij->i", normal, tail)])
+    weight = np.einsum("ij,ij->i", head - tail, head - tail)
+    i, j = np.triu_indices(4)
+    quadrics = weight[:, None] * plane[:, i] * plane[:, j]
+    for end in range(2):
+        for column in range(10):
+            mesh.quadrics[:, column] += np.bincount(
+                edges[:, end], quadrics[:, column], minlength=len(mesh.points)
+            )
 
 
 def _compact(mesh: _Mesh) -> Decimation:
