@@ -13,11 +13,9 @@ from devices.errors import InputError
 from runtime.character import Character
 from runtime.mapping import Drive, Mapping
 from runtime.performer import Pose, Rest
+from runtime.skin import Skin
 from solvers.abstraction import abstract
-from solvers.arap import ArapSolver
-from solvers.binding import bind
-from solvers.edges import unique_edges
-from solvers.heading import turned
+from solvers.heading import turn_about, turned
 from solvers.polyline_motion import ChainRetarget
 from solvers.skeleton_pose import SkeletonPose
 from solvers.tree import Tree
@@ -37,7 +35,7 @@ class Motion:
     """A character at one moment.
 
     Attributes:
-        vertices: (N, 3) [m] on the stage.
+        vertices: (N, 3) [m] on the stage; overwritten two motions later.
         node_positions: (K, 3) [m] on the stage.
         node_rotations: (K, 4) quaternions (x, y, z, w), world, from rest.
     """
@@ -74,7 +72,8 @@ class Puppet:
         tree: the character's nodes, hung on `root`.
         root: the node that stays in place.
         mapping: what drives it, or would.
-        binding: how its surface hangs on the nodes.
+        skin: its surface, on its bones.
+        binding: how the skin hangs on the nodes.
         gains: for each drive the share of the performer's turns that is carried over, in (0, 1].
     """
 
@@ -85,27 +84,9 @@ class Puppet:
         tree = Tree(skeleton.parents, skeleton.rest_positions)
         self.root = abstract(tree).root
         self.tree = tree.rerooted(self.root)
-        self.binding = bind(
-            character.vertices,
-            character.faces,
-            self.tree.parents,
-            self.tree.positions,
-            _bones_of_weights(character, self.tree.parents),
-        )
-        self._solver = ArapSolver(
-            character.vertices,
-            character.faces,
-            self.binding.handles,
-            groups=self.binding.anchor,
-        )
-        self._offsets = (
-            character.vertices[self.binding.handles]
-            - self.tree.positions[self.binding.pivot[self.binding.anchor]]
-        )
-        self._edges = unique_edges(character.vertices, character.faces)
-        self._rest_lengths = np.linalg.norm(
-            np.diff(character.vertices[self._edges], axis=1)[:, 0], axis=1
-        )
+        self.skin = Skin(character, self.tree)
+        self.binding = self.skin.binding
+        self._standing = [np.empty_like(character.vertices) for _ in range(2)]
         self.mapping = Mapping(())
         self.gains = np.ones(0)
         self._retargets: list[tuple[list[int], ChainRetarget]] = []
@@ -187,7 +168,7 @@ class Puppet:
             if np.percentile(stretch, 99.0) <= MOST_STRETCH:
                 break
             self._hold_back(stretch, pulls)
-        self._solver.reset()
+        self.skin.reset()
         for _, retarget in self._retargets:
             retarget.reset()
         corners = np.array(boxes)
@@ -196,11 +177,10 @@ class Puppet:
     def _try(self, pose: Pose) -> tuple[Array, Array]:
         """Corners (2, 3) [m] and relative stretch (E,) of the edges in one pose."""
         self.follow(pose)
-        vertices = self._solver.solve(self._targets(), iterations=REHEARSED_ITERATIONS)
-        lengths = np.linalg.norm(vertices[self._edges[:, 0]] - vertices[self._edges[:, 1]], axis=1)
-        seen = self._with_body(vertices).vertices
+        deformed = self.skin.deform(*self._anchors(), REHEARSED_ITERATIONS)
+        seen = self._with_body(deformed).vertices
         box = np.array([seen.min(axis=0), seen.max(axis=0)])
-        return box, np.abs(lengths / self._rest_lengths - 1.0)
+        return box, self.skin.stretch(deformed)
 
     def _hold_back(self, stretch: Array, pulls: NDArray[np.bool_]) -> None:
         """Make the turns smaller of each drive whose edges, of all E in T poses, are too tight."""
@@ -223,7 +203,7 @@ class Puppet:
             if self._parents[node] >= 0:
                 moved[node] |= moved[self._parents[node]]
         bone = np.where(self._bone >= 0, self._bone, self.binding.node)
-        near, far = bone[self.binding.owner][self._edges].T
+        near, far = bone[self.binding.owner][self.skin.edges].T
         pulls: NDArray[np.bool_] = bent[near] | bent[far] | (moved[near] != moved[far])
         return pulls
 
@@ -276,28 +256,28 @@ class Puppet:
 
     def deform(self) -> Motion:
         """Let the surface follow the nodes, and the whole follow the performer's body."""
-        vertices = self._solver.solve(self._targets(), iterations=self.iterations)
-        return self._with_body(vertices)
+        return self._with_body(self.skin.deform(*self._anchors(), self.iterations))
 
-    def _targets(self) -> Array:
-        """Where the handles (H, 3) [m] have to be."""
-        anchors = np.where(
+    def _anchors(self) -> tuple[Array, Array]:
+        """How the anchors have turned (A, 4), and the nodes (A, 3) that they turn about."""
+        bones = np.where(
             (self._bone >= 0)[:, None],
             self._bones[self._bone],
             self._rotations[self.binding.node],
         )
-        turn = Rotation.from_quat(anchors).as_matrix()[self.binding.anchor]
-        pivots = self._positions[self.binding.pivot][self.binding.anchor]
-        targets: Array = np.einsum("hij,hj->hi", turn, self._offsets) + pivots
-        return targets
+        return bones, self._positions[self.binding.pivot]
 
-    def _with_body(self, vertices: Array) -> Motion:
+    def _with_body(self, deformed: Array) -> Motion:
+        vertices = self.skin.cover(deformed)
         # Nothing may sink into the floor: what pushes against it lifts the whole.
         lift = max(self._lift, -float(vertices[:, 1].min()))
         self._shift = np.array([0.0, lift, 0.0])
+        self._standing.reverse()
+        standing = self._standing[0]
+        turn_about(vertices, self._turn, self.tree.positions[self.root], self._shift, standing)
         whole = Rotation.from_rotvec([0.0, self._turn, 0.0])
         return Motion(
-            vertices=self._on_stage(vertices),
+            vertices=standing,
             node_positions=self._on_stage(self._positions),
             node_rotations=(whole * Rotation.from_quat(self._rotations)).as_quat(),
         )
@@ -311,19 +291,6 @@ class Puppet:
         """Where the nodes of each chain of the mapping are, (k, 3) [m] each."""
         nodes = self._on_stage(self._positions)
         return [nodes[list(drive.target)] for drive in self.mapping.drives]
-
-
-def _bones_of_weights(character: Character, parents: Indices) -> Indices | None:
-    """The far end of the bone that each vertex belongs to, as the rig's weights say."""
-    if character.weights is None:
-        return None
-    joint = np.asarray(character.weights.argmax(axis=1)).ravel()
-    first_child = np.full(len(parents), -1, dtype=np.int64)
-    for node in range(len(parents) - 1, -1, -1):
-        if parents[node] >= 0:
-            first_child[parents[node]] = node
-    far: Indices = np.where(first_child[joint] >= 0, first_child[joint], joint)
-    return far
 
 
 def body_of(mapping: Mapping, legs: list[frozenset[int]], source: Array, target: Array) -> Body:

@@ -81,7 +81,7 @@ class GltfExport:
         """Keep one frame."""
         self._motion.add(frame)
         if self._written % self._stride == 0:
-            self._samples.append(replace(frame, picture=None))
+            self._samples.append(replace(frame, vertices=frame.vertices.copy(), picture=None))
             if len(self._samples) > _SAMPLES:
                 self._samples = self._samples[::2]
                 self._stride *= 2

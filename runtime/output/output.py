@@ -16,7 +16,8 @@ class PerformedFrame:
     Attributes:
         index: counts the frames of the show from 0.
         time: the performance's time [s], never falling; only differences count.
-        vertices: (N, 3) [m] welded vertices of the character, on the stage.
+        vertices: (N, 3) [m] welded vertices of the character, on the stage; who keeps them copies
+            them, since a later frame overwrites them.
         node_positions: (K, 3) [m] where the nodes of the character's skeleton are, on the stage.
         node_rotations: (K, 4) unit quaternions (x, y, z, w), world, of each node since its rest
             pose: all of them (0, 0, 0, 1) at rest.

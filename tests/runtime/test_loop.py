@@ -89,7 +89,7 @@ def loop_of(  # what every show needs, with what a test cares for
 ) -> FrameLoop:
     for puppet in puppets:
         puppet.rest()
-        puppet._solver.reset()
+        puppet.skin.reset()
     performer = Performer(BODY)
     hands = [Mapping(ARMS)] * len(puppets)
     return FrameLoop(

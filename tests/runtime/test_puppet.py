@@ -49,7 +49,7 @@ def seen(positions: np.ndarray) -> Pose:
 def driven(puppet: Puppet, drives: Sequence[Drive], body: Body | None = None) -> Pose:
     """Let the drives of a performer who stands at rest drive a puppet that stands at rest."""
     puppet.rest()
-    puppet._solver.reset()
+    puppet.skin.reset()
     start = seen(pose())
     puppet.take(Mapping(tuple(drives)), rest_state(start), FRONT, body or Body())
     return start

@@ -56,7 +56,7 @@ def rested(puppets: Sequence[Puppet]) -> list[Motion]:
     start = seen(pose())
     for puppet in puppets:
         puppet.rest()
-        puppet._solver.reset()
+        puppet.skin.reset()
         puppet.take(Mapping(ARMS), rest_state(start), FRONT_VIEW, Body())
     return [puppet.deform() for puppet in puppets]
 

@@ -1,0 +1,134 @@
+"""A character's surface on its bones: what holds it, and what it is made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from runtime.character import Character
+from runtime.characters.proxy import proxy_of
+from solvers.binding import bind
+from solvers.edges import unique_edges
+from solvers.squash_stretch import SquashStretchSolver
+from solvers.tree import Tree
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Elasticity:
+    """What a surface is made of; it may be changed while the show runs.
+
+    Attributes:
+        cartoon: 0 keeps every part rigid, 1 lets it squash and stretch.
+        volume_gain: how much of the volume that squash and stretch would cost is kept; more than
+            1 exaggerates.
+    """
+
+    cartoon: float = 0.0
+    volume_gain: float = 1.0
+
+
+class Skin:
+    """Binds a character's surface to its bones once, and lets it follow them.
+
+    A dense surface is not deformed itself: a coarse proxy of it is, and it follows.
+
+    Args:
+        character: whose surface.
+        tree: its nodes, hung on the one that holds it.
+
+    Attributes:
+        rest: (C, 3) [m] the surface that is deformed, at rest.
+        edges: (E, 2) its edges.
+        binding: how it hangs on the nodes.
+        notes: what the user should know about it, one short line each.
+    """
+
+    def __init__(self, character: Character, tree: Tree) -> None:
+        self._proxy = proxy = proxy_of(character)
+        self.rest = proxy.vertices
+        self.edges = unique_edges(proxy.vertices, proxy.faces)
+        self.notes = proxy.notes
+        ends = self.rest[self.edges]
+        self._rest_lengths = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
+        self.binding = bind(
+            proxy.vertices,
+            proxy.faces,
+            tree.parents,
+            tree.positions,
+            _bones_of_weights(character, proxy.kept, tree.parents),
+        )
+        handles, self._group = self.binding.handles, self.binding.anchor
+        self._solver = SquashStretchSolver(
+            proxy.vertices, proxy.faces, handles, groups=self._group, cartoon=0.0
+        )
+        self._offsets = self.rest[handles] - tree.positions[self.binding.pivot[self._group]]
+        self._answer = np.empty_like(self.rest)
+        self.elasticity = Elasticity()
+
+    @property
+    def elasticity(self) -> Elasticity:
+        """What the surface is made of."""
+        return self._elasticity
+
+    @elasticity.setter
+    def elasticity(self, elasticity: Elasticity) -> None:
+        self._solver.cartoon = elasticity.cartoon
+        self._solver.volume_gain = elasticity.volume_gain
+        self._elasticity = elasticity
+
+    @property
+    def energy(self) -> float:
+        """The energy of the surface as it was last deformed [m^2]."""
+        return self._solver.energy
+
+    def reset(self) -> None:
+        """Forget the last answer."""
+        self._solver.reset()
+
+    def deform(self, turns: Array, pivots: Array, iterations: int) -> Array:
+        """Let the deformed surface follow its anchors.
+
+        Args:
+            turns: (A, 4) how far each anchor has turned from rest, quaternions (x, y, z, w).
+            pivots: (A, 3) [m] where the node is about which it turns.
+            iterations: of the solver.
+
+        Returns:
+            (C, 3) [m], overwritten by the next call.
+        """
+        turn = Rotation.from_quat(turns).as_matrix()[self._group]
+        targets = np.einsum("hij,hj->hi", turn, self._offsets) + pivots[self._group]
+        return self._solver.solve(targets, iterations, out=self._answer)
+
+    def cover(self, deformed: Array) -> Array:
+        """Give the character's own vertices (N, 3) [m] that go with the deformed surface (C, 3).
+
+        They are overwritten by the next call, or are the deformed surface itself.
+        """
+        return self._proxy.follow(deformed)
+
+    def stretch(self, deformed: Array) -> Array:
+        """Relative change of length (E,) of the edges of the deformed surface (C, 3) [m]."""
+        ends = deformed[self.edges]
+        lengths = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
+        change: Array = np.abs(lengths / self._rest_lengths - 1.0)
+        return change
+
+
+def _bones_of_weights(character: Character, kept: Indices, parents: Indices) -> Indices | None:
+    """The far end of the bone that each vertex belongs to, as the rig's weights say."""
+    if character.weights is None:
+        return None
+    joint = np.asarray(character.weights[kept].argmax(axis=1)).ravel()
+    first_child = np.full(len(parents), -1, dtype=np.int64)
+    for node in range(len(parents) - 1, -1, -1):
+        if parents[node] >= 0:
+            first_child[parents[node]] = node
+    far: Indices = np.where(first_child[joint] >= 0, first_child[joint], joint)
+    return far
