@@ -8,7 +8,7 @@ from statistics import median
 HALF = 0.5  # of a period without anything ends a frame
 UNKNOWN_GAP = 0.004  # [s] that ends one while the period is not known
 LONGEST_GAP = 0.25  # [s]
-KEPT_PERIODS = 9
+FEWEST_PERIODS, KEPT_PERIODS = 2, 9
 REMEMBERED_FRAMES = 30  # a part that none of these had is not waited for
 
 
@@ -35,9 +35,11 @@ class FrameAssembly:
         self._periods: deque[float] = deque(maxlen=KEPT_PERIODS)
 
     @property
-    def period(self) -> float | None:
-        """The median time [s] from frame to frame; None before three frames."""
-        return median(self._periods) if len(self._periods) > 1 else None
+    def gap(self) -> float:
+        """The time [s] between two messages by which they are of different frames."""
+        if len(self._periods) < FEWEST_PERIODS:
+            return UNKNOWN_GAP
+        return min(HALF * median(self._periods), LONGEST_GAP)
 
     def add(self, part: int, arrival: float) -> None:
         """Take in a part that came at `arrival` [s]."""
@@ -48,11 +50,7 @@ class FrameAssembly:
 
     def overdue(self, now: float) -> bool:
         """Whether nothing has come for so long that the frame is over: rule (c)."""
-        if not self.parts:
-            return False
-        period = self.period
-        gap = UNKNOWN_GAP if period is None else min(HALF * period, LONGEST_GAP)
-        return now - self.newest > gap
+        return bool(self.parts) and now - self.newest > self.gap
 
     @property
     def whole(self) -> bool:
@@ -69,6 +67,10 @@ class FrameAssembly:
         if self._previous is not None:
             self._periods.append(self._began - self._previous)
         self._previous = self._began
+        self.parts = set()
+
+    def discard(self) -> None:
+        """The parts are those of the last frame once more: no frame."""
         self.parts = set()
 
     def restart(self) -> None:

@@ -266,15 +266,17 @@ class VmcDecoder:
         """End the frame that was being put together, and give it unless it came before."""
         assembly, pose = self._assembly, self._pose
         parts = [part % COUNT for part in assembly.parts]
-        arrival, period = assembly.newest, assembly.period
-        assembly.end()
+        arrival = assembly.newest
         self._closing = self._rooted = False
+        if self._repeated(arrival):
+            assembly.discard()
+            self.refused += 1
+            return
+        assembly.end()
         device = self._time
         if self._time_used:  # the clock is told less often than bones are
             device += arrival - self._time_came
-        repeated = self._repeated(arrival, period)
-        if repeated or not self._valid:
-            self.refused += repeated
+        if not self._valid:
             return
         self._time_used = True
         self._calibrate_when_due(arrival)
@@ -293,12 +295,11 @@ class VmcDecoder:
             )
         )
 
-    def _repeated(self, arrival: float, period: float | None) -> bool:
+    def _repeated(self, arrival: float) -> bool:
         """Whether the network brought the last frame again: the same pose, at once."""
         last, self._last = self._last, (arrival, self._pose.content)
-        if last is None or period is None or last[1] != self._last[1]:
-            return False
-        return arrival - last[0] < period / 2.0
+        same = last is not None and last[1] == self._last[1]
+        return last is not None and same and arrival - last[0] < self._assembly.gap
 
     def _calibrate_when_due(self, arrival: float) -> None:
         if self._first is None:

@@ -25,6 +25,7 @@ def message(address: str, *arguments: object) -> OscMessage:
 
 
 def bundle(messages: Sequence[OscMessage], timetag: float = IMMEDIATELY) -> bytes:
+    """One bundle; its time tag in seconds since 1970."""
     builder = OscBundleBuilder(timetag)
     for one in messages:
         builder.add_content(one)
