@@ -130,21 +130,22 @@ class Recorder:
                     self._attempt(self._writer.sync)
 
     def _keep(self, number: int, frame: SkeletonFrame) -> None:
-        if not self._attempt(lambda: self._writer.write(frame, number)):
-            self._unwritten += 1
+        written = self._writer.frames
+        self._attempt(lambda: self._writer.write(frame, number))
+        self._unwritten += self._writer.frames == written
 
-    def _attempt(self, write: Callable[[], None]) -> bool:
+    def _attempt(self, write: Callable[[], None]) -> None:
         try:
             write()
         except InputError as error:
             self._fail(error)
-            return False
-        except ValueError:  # a frame that no file could hold; the next one may be whole
-            return False
-        if self._writer.moved and not self._moved:
+        except ValueError:
+            pass  # a frame that no file could hold; the next one may be whole
+        except Exception as error:  # a show must outlive a mistake of ours in here
+            self._fail(InputError(f"cannot write {self.path}: {error!r}; please report this"))
+        if self._writer.moved and not (self._moved or self._fault):
             self._moved = True
             self._tell(f"{self.path} was moved; the recording goes on in it, wherever it is now")
-        return True
 
     def _fail(self, error: InputError) -> None:
         if not self._fault:
