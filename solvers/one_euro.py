@@ -23,6 +23,10 @@ DERIVATIVE_CUTOFF = 3.0
 """[Hz] of the velocity that sets the cutoff."""
 
 
+NO_TIME = 1e-6
+"""[s] and less between two samples tell no velocity."""
+
+
 def smoothing_factor(cutoff: Array | float, dt: float) -> Array:
     """The weight of the newest sample in exponential smoothing.
 
@@ -76,7 +80,7 @@ class OneEuroFilter:
         if self._raw is None or self._smooth is None or self.velocity is None:
             self._raw = self._smooth = points.copy()
             self.velocity = np.zeros_like(points)
-        elif dt > 0.0:
+        elif dt > NO_TIME:
             slope = (points - self._raw) / dt
             weight = smoothing_factor(self.derivative_cutoff, dt)
             self.velocity = self.velocity + weight * (slope - self.velocity)

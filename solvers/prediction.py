@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.one_euro import smoothing_factor
+from solvers.one_euro import NO_TIME, smoothing_factor
 
 Array = NDArray[np.float64]
 
@@ -27,6 +27,7 @@ class Predictor:
         """Forget all motion."""
         self._before: Array | None = None
         self._velocity: Array | float = 0.0
+        self._step = 0.0
 
     def predict(self, points: Array, dt: float) -> Array:
         """Points (n, 3) [m] as they will be one step later.
@@ -35,10 +36,11 @@ class Predictor:
             points: (n, 3) [m], finite.
             dt: [s] since the sample before, which the next is expected to take too.
         """
-        if self._before is not None and dt > 0.0:
+        if self._before is not None and dt > NO_TIME:
             slope = (points - self._before) / dt
             weight = smoothing_factor(VELOCITY_CUTOFF, dt)
+            self._step = min(dt, MOST)
             self._velocity = self._velocity + weight * (slope - self._velocity)
         self._before = points.copy()
-        ahead: Array = points + self._velocity * (GOES_ON * min(dt, MOST))
+        ahead: Array = points + self._velocity * (GOES_ON * self._step)
         return ahead

@@ -177,8 +177,11 @@ class Faults:
         return confirmed
 
     def _stretched(self, positions: Array, distance: Array) -> Bools:
-        """The less expected ends of the long bones that have not their usual length, and what hangs
-        on these. Nobody needs to confirm them: the usual length gives way with time."""
+        """The less expected ends of the long bones that have not their usual length.
+
+        What hangs on them went along, unless the next bone too is stretched at this end. Nobody
+        needs to confirm them: the usual length gives way with time.
+        """
         body, trust = self._body, self._trust
         ends = positions[body.bones] - positions[body.near]
         length = np.sqrt(np.einsum("ij,ij->i", ends, ends))
@@ -196,7 +199,9 @@ class Faults:
         if judged.any():
             worse = np.nan_to_num(distance[body.bones]) >= np.nan_to_num(distance[body.near])
             joints[body.near[judged & ~worse]] = True
-            joints |= body.beyond[judged & worse].any(axis=0)
+            alone = joints[body.bones]
+            joints[body.bones[judged & worse]] = True
+            joints |= body.beyond[judged & worse & ~alone].any(axis=0)
         return joints
 
     def _believe(self, positions: Array, seen: Bools, time: float) -> None:

@@ -45,6 +45,7 @@ class Timeline:
         self._newest: dict[int, _Newest] = {}
         self._last: SkeletonFrame | None = None
         self._shift = 0.0
+        self._begin = -math.inf  # of the sender's clock since it jumped
 
     def admit(self, frame: SkeletonFrame) -> SkeletonFrame | None:
         """The frame on the show's clock, or None where it is to be dropped."""
@@ -52,6 +53,9 @@ class Timeline:
             self.late += 1
             return None
         self._follow_jumps(frame)
+        if frame.time < self._begin:  # others' frames from before the jump
+            self.late += 1
+            return None
         before = self._newest.get(frame.performer)
         if before is not None and frame.time <= before.frame.time:
             if frame.time == before.frame.time and _alike(frame, before.frame):
@@ -92,7 +96,7 @@ class Timeline:
         go_on = max(passed, LEAST_STEP) if math.isfinite(passed) else LEAST_STEP
         self._shift += self._last.time + go_on - frame.time
         self._newest.clear()
-        self._last = frame
+        self._last, self._begin = frame, frame.time
         self.jumps += 1
 
 
