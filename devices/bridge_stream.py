@@ -247,6 +247,8 @@ class BridgeStream:
 def open_device(address: SplitResult) -> BridgeStream:
     """Open ``zmq+tcp://HOST:PORT``."""
     host, port = host_and_port(address, PORT)
+    if port == 0:
+        raise InputError(f"cannot open {address.geturl()!r}: give the port that the bridge tells")
     options = options_of(address, {"mode": one_of(*MODES), "keys": Path, "wait": positive})
     keys: Path | None = options.get("keys")
     check_guarded(host, keys=keys, option=f"`?keys=DIR/stage` in {address.geturl()}")

@@ -56,13 +56,12 @@ def binding(bind: str, keys: Path | None, *, option: str) -> Binding:
         InputError: it is no such address, or it is beyond this machine and there are no keys;
             `option` is what gives them.
     """
-    address = urlsplit(bind.replace(":*", ":0"))
     try:
+        address = urlsplit(bind.replace(":*", ":0"))
         host, port = address.hostname, address.port
     except ValueError:
-        port = None
-    plain = address.scheme == "tcp" and not (address.path or address.query or address.fragment)
-    if not plain or host is None or port is None:
+        host = port = None
+    if host is None or port is None or bind.count("/") != 2 or not bind.startswith("tcp://"):
         raise InputError(
             f"cannot bind {bind!r}: expected tcp://HOST:PORT, as in tcp://127.0.0.1:5570"
         )
