@@ -155,6 +155,7 @@ def fit_pose_cells(x: Floats, cells: Cells, planes: Planes, gain: float, out: Fi
     cell's plane; see `solvers.squash_stretch`.
     """
     matrices, scales, laplace_x, room = out
+    axes = planes.axes
     count = len(cells.starts) - 1
     for block in prange((count + LANES - 1) // LANES):
         lanes, first = room[get_thread_id()], block * LANES
@@ -162,60 +163,67 @@ def fit_pose_cells(x: Floats, cells: Cells, planes: Planes, gain: float, out: Fi
         fit_rotations(lanes, min(LANES, count - first))
         for k in range(min(LANES, count - first)):
             i = first + k
-            axes = planes.axes[i]
-            faa, fab, fbb = _stretch(lanes, k, axes, planes.shares[i])
+            faa, fab, fbb = _stretch(lanes, k, planes, i)
             s, q, aa, ab, bb = _soft_axis(faa, fab, fbb)
             scales[i] = s
-            along, across = _volume_scales(s, q, gain)
+            along, across, rest = _volume_scales(s, q, gain)
+            aa, ab, bb = (
+                across - rest + (along - across) * aa,
+                (along - across) * ab,
+                across - rest + (along - across) * bb,
+            )
             for row in range(3):
-                ra = rb = 0.0
-                for column in range(3):
-                    turn = lanes[_R + (3 * row + column) * LANES + k]
-                    ra += turn * axes[column]
-                    rb += turn * axes[3 + column]
-                pa, pb = (
-                    (along - across) * (ra * aa + rb * ab),
-                    (along - across) * (ra * ab + rb * bb),
-                )
-                for column in range(3):
-                    turn = lanes[_R + (3 * row + column) * LANES + k]
-                    matrices[i, 3 * row + column] = (
-                        across * turn + pa * axes[column] + pb * axes[3 + column]
-                    )
+                r0 = lanes[_R + 3 * row * LANES + k]
+                r1 = lanes[_R + (3 * row + 1) * LANES + k]
+                r2 = lanes[_R + (3 * row + 2) * LANES + k]
+                ra = r0 * axes[i, 0] + r1 * axes[i, 1] + r2 * axes[i, 2]
+                rb = r0 * axes[i, 3] + r1 * axes[i, 4] + r2 * axes[i, 5]
+                pa, pb = ra * aa + rb * ab, ra * ab + rb * bb
+                matrices[i, 3 * row] = rest * r0 + pa * axes[i, 0] + pb * axes[i, 3]
+                matrices[i, 3 * row + 1] = rest * r1 + pa * axes[i, 1] + pb * axes[i, 4]
+                matrices[i, 3 * row + 2] = rest * r2 + pa * axes[i, 2] + pb * axes[i, 5]
 
 
 @kernel
-def _stretch(lanes: Floats, k: int, axes: Floats, shares: Floats) -> tuple[float, float, float]:
-    """The stretch of cell k in its rest plane, as a symmetric matrix (aa, ab, bb); I at rest."""
-    wa, wb = shares[0], shares[1]
-    faa, fab, fbb = shares[2], 0.0, shares[3]
+def _stretch(lanes: Floats, k: int, planes: Planes, i: int) -> tuple[float, float, float]:
+    """The stretch of cell i, in column k, in its rest plane: symmetric (aa, ab, bb), I at rest."""
+    axes, shares = planes.axes, planes.shares
+    a0, a1, a2 = axes[i, 0], axes[i, 1], axes[i, 2]
+    b0, b1, b2 = axes[i, 3], axes[i, 4], axes[i, 5]
+    faa = fab = fbb = 0.0
     for row in range(3):
-        ra = rb = sa = sb = 0.0  # the rest axes as R takes them, and as S does
-        for column in range(3):
-            entry = (3 * row + column) * LANES + k
-            a, b = axes[column], axes[3 + column]
-            ra += lanes[_R + entry] * a
-            rb += lanes[_R + entry] * b
-            sa += lanes[entry] * a
-            sb += lanes[entry] * b
-        faa += wa * wa * ra * sa
-        fab += 0.5 * wa * wb * (ra * sb + rb * sa)
-        fbb += wb * wb * rb * sb
-    return faa, fab, fbb
+        s0, s1, s2 = (
+            lanes[3 * row * LANES + k],
+            lanes[(3 * row + 1) * LANES + k],
+            lanes[(3 * row + 2) * LANES + k],
+        )
+        r0, r1, r2 = (
+            lanes[_R + 3 * row * LANES + k],
+            lanes[_R + (3 * row + 1) * LANES + k],
+            lanes[_R + (3 * row + 2) * LANES + k],
+        )
+        # The rest axes a and b, as R takes them and as S does.
+        ra, rb = r0 * a0 + r1 * a1 + r2 * a2, r0 * b0 + r1 * b1 + r2 * b2
+        sa, sb = s0 * a0 + s1 * a1 + s2 * a2, s0 * b0 + s1 * b1 + s2 * b2
+        faa += ra * sa
+        fab += ra * sb + rb * sa
+        fbb += rb * sb
+    wa, wb = shares[i, 0], shares[i, 1]
+    return wa * wa * faa + shares[i, 2], 0.5 * wa * wb * fab, wb * wb * fbb + shares[i, 3]
 
 
 @kernel
-def _volume_scales(s: float, q: float, gain: float) -> tuple[float, float]:
-    """The scales along and across the primary axis, g and c, of V = c I + (g - c) W.
+def _volume_scales(s: float, q: float, gain: float) -> tuple[float, float, float]:
+    """The scales along and across the primary axis, g and c, and that off the plane, 1 / det.
+
+    In the plane V is c I + (g - c) W, whose determinant is c g where the axis is hard: then the
+    third scale is c too, as in the paper.
 
     Source: Celikcan et al. 2015, eqs. (10) and (12), with s' = 1 + gain (s - 1).
     """
     g = min(max(1.0 + gain * (s - 1.0), LEAST_SCALE), LARGEST_SCALE)
     c = 1.0 / math.sqrt(g)
-    # det V = c (c + (g - c) q) (c + (g - c) (1 - q)) is one for a hard axis, and is made one.
-    volume = c * (c * g + (g - c) * (g - c) * q * (1.0 - q))
-    even = volume ** (-1.0 / 3.0)
-    return even * g, even * c
+    return g, c, 1.0 / (c * g + (g - c) * (g - c) * q * (1.0 - q))
 
 
 @kernel
@@ -230,24 +238,30 @@ def _soft_axis(faa: float, fab: float, fbb: float) -> tuple[float, float, float,
     radius = math.sqrt(half * half + fab * fab)
     f = min(max(middle + radius, LEAST_SCALE), LARGEST_SCALE)
     h = min(max(middle - radius, LEAST_SCALE), LARGEST_SCALE)
-    # (f - 1/f) / 2 is nearly log f: half the length weighs as much as twice.
-    first, second = (f - 1.0 / f) * (f - 1.0 / f), (h - 1.0 / h) * (h - 1.0 / h)
-    largest = max(first, second, _TINY)
-    first, second = first / largest, second / largest
+    # f - 1/f is nearly twice log f: half the length weighs as much as double. Both times f h here.
+    first, second = (f * f - 1.0) * h, (h * h - 1.0) * f
+    first, second = first * first, second * second
+    ratio = min(first, second) / max(first, second, _TINY)
     for _ in range(3):
-        first, second = first * first, second * second
-    q = first / (first + second) if first + second > 0.0 else 0.5
+        ratio *= ratio
+    q = 1.0 / (1.0 + ratio) if first >= second else ratio / (1.0 + ratio)
     lean = (q - 0.5) / radius if radius > 1e-12 else 0.0
     s = q * f + (1.0 - q) * h
     return s, q, 0.5 + lean * half, lean * fab, 0.5 - lean * half
 
 
 @parallel_kernel
-def push(x: Floats, shell: Shell, scales: Floats, fixed: NDArray[np.bool_], out: Floats) -> None:
+def strain_cells(scales: Floats, out: Floats) -> None:
+    """How far each cell is from its rest length, |s - 1/s| / 2, out (N,)."""
+    for i in prange(len(out)):
+        out[i] = 0.5 * abs(scales[i] - 1.0 / scales[i])
+
+
+@parallel_kernel
+def push(x: Floats, shell: Shell, strains: Floats, fixed: NDArray[np.bool_], out: Floats) -> None:
     """How a pressure pushes the vertices, out (N, 3): area vectors times the strain of their cells.
 
-    An area vector is the gradient of the volume; the strain |s - 1/s| / 2 is zero where nothing is
-    squashed. Fixed vertices are not pushed.
+    An area vector is the gradient of the volume. Fixed vertices are not pushed.
     """
     corners, pairs = shell.corners, shell.pairs
     for index in prange(len(out)):
@@ -262,53 +276,54 @@ def push(x: Floats, shell: Shell, scales: Floats, fixed: NDArray[np.bool_], out:
                 a0 += b1 * c2 - b2 * c1
                 a1 += b2 * c0 - b0 * c2
                 a2 += b0 * c1 - b1 * c0
-            strain = abs(scales[i] - 1.0 / scales[i]) / 12.0
+            strain = strains[i] / 6.0
             a0, a1, a2 = a0 * strain, a1 * strain, a2 * strain
         out[i, 0], out[i, 1], out[i, 2] = a0, a1, a2
 
 
 @parallel_kernel
-def volume_terms(x: Floats, g: Floats, shell: Shell, scales: Floats, out: Floats) -> None:
-    """What each chunk of the shell adds to its component's volume, out (chunks, 6).
+def volume_terms(x: Floats, g: Floats, shell: Shell, strains: Floats, out: Floats) -> None:
+    """What each chunk of the shell adds to its component's volume, out (chunks, 5).
 
-    Columns 0 to 3 are the volume of x + m g as a polynomial in m, constant first; 4 and 5 the rest
-    areas times the strain |s - 1/s| / 2 of the cells on them, and times (1/s - s) / 2, with sign.
+    Columns 0 to 3 are the volume of x + m g as a polynomial in m, constant first; 4 the strains of
+    the cells, times the rest areas on them.
     """
     faces, chunks, origins, areas = shell.faces, shell.chunks, shell.origins, shell.areas
     for chunk in prange(len(chunks) - 1):
-        origin = np.uint64(origins[chunk])
-        p = np.empty((6, 3))
-        t0 = t1 = t2 = t3 = strained = squashed = 0.0
+        o = np.uint64(origins[chunk])
+        o0, o1, o2 = x[o, 0], x[o, 1], x[o, 2]
+        t0 = t1 = t2 = t3 = strained = 0.0
         for face in range(chunks[chunk], chunks[chunk + 1]):
-            strain = 0.0
-            for corner in range(3):
-                v = np.uint64(faces[face, corner])
-                for axis in range(3):
-                    p[corner, axis] = x[v, axis] - x[origin, axis]
-                    p[3 + corner, axis] = g[v, axis]
-                s = scales[v]
-                strain += 1.0 / s - s
-                strained += areas[face] * abs(1.0 / s - s) / 6.0
-            squashed += areas[face] * strain / 6.0
-            t0 += _triple(p, 0, 1, 2)
-            t1 += _triple(p, 3, 1, 2) + _triple(p, 0, 4, 2) + _triple(p, 0, 1, 5)
-            t2 += _triple(p, 3, 4, 2) + _triple(p, 3, 1, 5) + _triple(p, 0, 4, 5)
-            t3 += _triple(p, 3, 4, 5)
-        out[chunk, 0], out[chunk, 1], out[chunk, 2], out[chunk, 3] = t0, t1, t2, t3
-        out[chunk, 4], out[chunk, 5] = strained, squashed
+            i, j = np.uint64(faces[face, 0]), np.uint64(faces[face, 1])
+            k = np.uint64(faces[face, 2])
+            p = x[i, 0] - o0, x[i, 1] - o1, x[i, 2] - o2
+            q = x[j, 0] - o0, x[j, 1] - o1, x[j, 2] - o2
+            r = x[k, 0] - o0, x[k, 1] - o1, x[k, 2] - o2
+            u = g[i, 0], g[i, 1], g[i, 2]
+            v = g[j, 0], g[j, 1], g[j, 2]
+            w = g[k, 0], g[k, 1], g[k, 2]
+            qr, vw = _cross(q, r), _cross(v, w)
+            mixed = _cross(q, w), _cross(v, r)
+            t0 += _dot(p, qr)
+            t1 += _dot(u, qr) + _dot(p, mixed[0]) + _dot(p, mixed[1])
+            t2 += _dot(p, vw) + _dot(u, mixed[0]) + _dot(u, mixed[1])
+            t3 += _dot(u, vw)
+            strained += areas[face] * (strains[i] + strains[j] + strains[k])
+        out[chunk, 0], out[chunk, 1], out[chunk, 2] = t0 / 6.0, t1 / 6.0, t2 / 6.0
+        out[chunk, 3], out[chunk, 4] = t3 / 6.0, strained / 3.0
+
+
+_Vector = tuple[float, float, float]
 
 
 @kernel
-def _triple(p: Floats, i: int, j: int, k: int) -> float:
-    """A sixth of the triple product of three rows: the volume over a triangle."""
-    return float(
-        (
-            p[i, 0] * (p[j, 1] * p[k, 2] - p[j, 2] * p[k, 1])
-            + p[i, 1] * (p[j, 2] * p[k, 0] - p[j, 0] * p[k, 2])
-            + p[i, 2] * (p[j, 0] * p[k, 1] - p[j, 1] * p[k, 0])
-        )
-        / 6.0
-    )
+def _cross(a: _Vector, b: _Vector) -> _Vector:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@kernel
+def _dot(a: _Vector, b: _Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @parallel_kernel
@@ -323,10 +338,10 @@ def add_scaled(pressures: Floats, part_of: NDArray[np.int64], g: Floats, x: Floa
 
 @kernel
 def sum_parts(terms: Floats, parts: NDArray[np.int64], out: Floats) -> None:
-    """The terms of chunks (chunks, 6), each of the component in `parts`, summed into out (C, 6)."""
+    """The terms of chunks (chunks, 5), each of the component in `parts`, summed into out (C, 5)."""
     out[:] = 0.0
     for chunk in range(len(parts)):
-        for term in range(6):
+        for term in range(5):
             out[parts[chunk], term] += terms[chunk, term]
 
 
@@ -334,7 +349,7 @@ def sum_parts(terms: Floats, parts: NDArray[np.int64], out: Floats) -> None:
 def find_pressures(sums: Floats, rest: Floats, shape: Floats, gain: float, out: Floats) -> None:
     """The pressure m in each component, out (C,), that gives its volume back, or `gain` of it.
 
-    From the sums (C, 6) of `volume_terms`, the volumes and areas at rest (C, 2), and the volumes of
+    From the sums (C, 5) of `volume_terms`, the volumes and areas at rest (C, 2), and the volumes of
     the shape state (C,), which lead the way beyond one: what the shape state lost, gained.
     """
     for part in range(len(out)):

@@ -38,6 +38,7 @@ from solvers.squash_kernels import (
     fit_scaled_cells,
     push,
     rest_covariances,
+    strain_cells,
     sum_parts,
     volume_terms,
 )
@@ -89,11 +90,12 @@ class SquashStretchSolver(ArapSolver):
         self._planes = _planes(self._VR.reshape(-1, 3, 3))
         self._shell = build_shell(self._rest, self._layout.faces, self._layout.parts)
         parts = int(self._layout.parts.max()) + 1
+        self._strains = np.zeros(count)
         self._pose = self._rest.copy()
         self._push = np.zeros((count, 3))
         self._swell = np.zeros((count, 3))
-        self._chunk_terms = np.zeros((len(self._shell.parts), 6))
-        self._sums = np.zeros((parts, 6))
+        self._chunk_terms = np.zeros((len(self._shell.parts), 5))
+        self._sums = np.zeros((parts, 5))
         self._shape_volumes = np.zeros(parts)
         self._pressures = np.zeros(parts)
         self._rest_sizes = self._measure_rest()
@@ -174,7 +176,8 @@ class SquashStretchSolver(ArapSolver):
         if gain > 1.0:
             self._measure(self._x)
             self._shape_volumes[:] = self._sums[:, 0]
-        push(self._pose, self._shell, self._scales, self._system.held.fixed, self._push)
+        strain_cells(self._scales, self._strains)
+        push(self._pose, self._shell, self._strains, self._system.held.fixed, self._push)
         self._system.add_solution(self._push, self._swell)
         self._measure(self._pose)
         find_pressures(self._sums, self._rest_sizes, self._shape_volumes, gain, self._pressures)
@@ -182,7 +185,7 @@ class SquashStretchSolver(ArapSolver):
 
     def _measure(self, x: Floats) -> None:
         """Sum the volume terms of each component at x (N, 3)."""
-        volume_terms(x, self._swell, self._shell, self._scales, self._chunk_terms)
+        volume_terms(x, self._swell, self._shell, self._strains, self._chunk_terms)
         sum_parts(self._chunk_terms, self._shell.parts, self._sums)
 
     def _measure_rest(self) -> Floats:
