@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Self
 
 import moderngl
@@ -37,7 +38,7 @@ class Kept:
         self.log = log if log is not None else []
 
     def write(self, frame: PerformedFrame) -> None:
-        self.frames.append(frame)
+        self.frames.append(replace(frame, vertices=frame.vertices.copy()))
         self.log.append(f"{id(self)}:{frame.index}")
 
     def close(self) -> None: ...
