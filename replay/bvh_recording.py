@@ -8,6 +8,8 @@ from typing import TextIO
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from devices.errors import InputError
+from replay.bvh_text import MOST_POSES
 from replay.bvh_writer import LONE_STEP, UNITS, write_bvh
 from replay.even_times import even_times
 from replay.fill import Filler
@@ -47,6 +49,9 @@ def write_bvh_recording(
         recording: of one performer.
         unit: a key of `UNITS`.
         rate: frames a second of the file.
+
+    Raises:
+        InputError: there would be more poses than `replay.bvh` reads.
     """
     fresh = np.flatnonzero(np.diff(recording.times, prepend=-np.inf) > 0)  # one frame a moment
     filler = Filler(recording.skeleton)
@@ -59,6 +64,8 @@ def write_bvh_recording(
     strays = np.percentile(off, (50, 99, 100)) if off.size else np.zeros(3)
     root, turned, slides, step = motion.root, motion.rotations, motion.slides, LONE_STEP
     even = even_times(recording.times[fresh], rate)
+    if even is not None and len(even.share) * len(recording.skeleton.names) > MOST_POSES:
+        raise InputError(f"{len(even.share)} frames are too many; ask for a lower rate")
     if even is not None:
         quaternions = Rotation.from_matrix(turned.reshape(-1, 3, 3)).as_quat()
         turned = as_matrices(even.rotations(quaternions.reshape(*turned.shape[:2], 4)))

@@ -7,8 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from devices.errors import InputError
+
 Array = NDArray[np.float64]
 
+MOST_TIMES = 2_000_000  # 9 hours at 60 Hz
 _LENGTHEN = 16  # a gappy recording may become so many times as many frames, at most
 
 
@@ -50,15 +53,23 @@ def even_times(times: Array, rate: float | None = None) -> EvenTimes | None:
         times: of the frames.
         rate: frames a second; by default that of the median step. A recording with gaps gets no
             more than 16 times its frames.
+
+    Raises:
+        InputError: that would be more than `MOST_TIMES`.
     """
     if len(times) < 2:
         return None
     span = float(times[-1] - times[0])
-    wanted = float(np.median(np.diff(times))) if rate is None else 1.0 / rate
-    step = max(wanted, span / (_LENGTHEN * len(times)))
-    # The last frame is kept by an ever so slightly other step, unless somebody names the rate.
-    count = max(round(span / step), 1) if rate is None else max(int(span / step + 1e-6), 1)
-    step = span / count if rate is None else step
+    if rate is None:
+        # An ever so slightly other step keeps the last frame.
+        usual = max(float(np.median(np.diff(times))), span / (_LENGTHEN * len(times)))
+        count = max(round(span / usual), 1)
+        step = span / count
+    else:
+        step = 1.0 / rate
+        count = int(span / step + 1e-6)
+    if count > MOST_TIMES:
+        raise InputError(f"{count + 1} frames are too many; ask for a lower rate")
     even = times[0] + np.minimum(step * np.arange(count + 1), span)
     after = np.clip(np.searchsorted(times, even), 1, len(times) - 1)
     share = (even - times[after - 1]) / (times[after] - times[after - 1])
