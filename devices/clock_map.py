@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-WINDOW = 5.0  # [s] of arrivals that one minimum is taken over
-FARTHEST = 1.0  # [s] a mapped time may lie before its arrival
+WINDOW = 2.0  # [s] of arrivals that one minimum is taken over
+FARTHEST = 0.5  # [s] a mapped time may lie before its arrival
 LARGEST = 1e11  # [s] of a device clock: 3000 years; more has no milliseconds left in a float64
 STEP_BACK = 0.25  # [s] that no packet is late by on a local network
 

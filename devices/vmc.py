@@ -123,7 +123,7 @@ class VmcDecoder:
         except OscError:
             self.refused += 1
             return ()
-        if self._late(messages):
+        if self._late(messages, arrival):
             self.refused += 1
             return ()
         self._frames = []
@@ -138,8 +138,10 @@ class VmcDecoder:
             self._finish()
         return self._frames
 
-    def _late(self, messages: Sequence[Message]) -> bool:
-        """Whether a datagram was overtaken by a newer one."""
+    def _late(self, messages: Sequence[Message], arrival: float) -> bool:
+        """Whether a datagram was overtaken by a newer one, just now."""
+        if not arrival - self._time_came <= STEP_BACK:
+            return False  # the sender's clock was set back a little, or stands
         for message in messages:
             if message.address == "/VMC/Ext/T" and message.tags[:1] == "f":
                 time = message.arguments[0]
@@ -297,9 +299,12 @@ class VmcDecoder:
 
     def _repeated(self, arrival: float) -> bool:
         """Whether the network brought the last frame again: the same pose, at once."""
-        last, self._last = self._last, (arrival, self._pose.content)
-        same = last is not None and last[1] == self._last[1]
-        return last is not None and same and arrival - last[0] < self._assembly.gap
+        content = self._pose.content
+        last = self._last
+        if last is not None and last[1] == content and arrival - last[0] < self._assembly.gap:
+            return True
+        self._last = arrival, content
+        return False
 
     def _calibrate_when_due(self, arrival: float) -> None:
         if self._first is None:

@@ -311,6 +311,16 @@ def test_a_sender_that_starts_again_is_followed_at_once_whatever_its_clock() -> 
     )
 
 
+@pytest.mark.parametrize("back", [0.1, 0.25, 100.0])
+def test_a_clock_that_is_set_back_or_stands_does_not_end_the_show(back: float) -> None:
+    decoder = VmcDecoder()
+    fed(decoder, [(k * STEP, slime(500 + k * STEP, waving(k))) for k in range(30)])
+    standing = slime(500 + 29 * STEP - back)
+    frames = fed(decoder, [(1 + k * STEP, standing) for k in range(300)])
+    assert len(frames) > 250
+    assert frames[-1].arrival - frames[-1].time < 0.02
+
+
 POSE = [0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]
 
 

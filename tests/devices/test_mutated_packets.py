@@ -1,0 +1,111 @@
+"""Packets with random damage: no exception, no stall, no memory that grows.
+
+CI sends some thousands to each decoder; ``BUNRAKU_MUTATIONS=200000 pytest`` with this file sends
+as many as the project's promise names.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import tracemalloc
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from devices.senders import Decoder
+from devices.vmc import PERFORMER, VmcDecoder
+from devices.vrchat import VrchatDecoder
+from tests.devices.vmc_sender import at, bones, bundle, message, ok, root, slime
+
+MUTATIONS = int(os.environ.get("BUNRAKU_MUTATIONS", "3000"))
+TRACED = 1000
+STEP = 1 / 250
+TURN = {"Hips": Rotation.from_euler("x", 0.3)}
+POSE = (0.1, 1.0, 0.2, 0.0, 0.0, 0.0, 1.0)
+
+
+def vmc_packets() -> list[bytes]:
+    expressions = [message("/VMC/Ext/Blend/Val", f"face{n}", 0.5) for n in range(5)]
+    return [
+        slime(1.0, TURN),
+        bundle([root(), *bones(TURN)[:17]]),
+        bundle([*bones(TURN)[40:], ok(1, 3, 0, 1), at(1.1)]),
+        bundle([*expressions, message("/VMC/Ext/Blend/Apply")]),
+        bones()[0].dgram,
+        at(1.2).dgram,
+    ]
+
+
+def tracker_packets() -> list[bytes]:
+    devices = ("Hmd", "Con", "Tra")
+    said = [message(f"/VMC/Ext/{one}/Pos", f"LeftFoot {one}", *POSE) for one in devices]
+    return [bundle([at(1.0), *said]), *(one.dgram for one in said), bundle(bones(TURN)[30:36])]
+
+
+def vrchat_packets() -> list[bytes]:
+    said = [
+        message(f"/tracking/trackers/{which}/{what}", 0.1, 1.0, 0.2)
+        for which in ("head", *range(1, 9))
+        for what in ("position", "rotation")
+    ]
+    return [bundle(said), *(one.dgram for one in said)]
+
+
+DECODERS: dict[str, tuple[Callable[[], Decoder], Callable[[], list[bytes]]]] = {
+    "vmc": (VmcDecoder, vmc_packets),
+    "vmc performer": (lambda: VmcDecoder(PERFORMER), tracker_packets),
+    "vrchat": (VrchatDecoder, vrchat_packets),
+}
+"""What each protocol's decoder is, and good packets to damage."""
+
+
+def damaged(chance: random.Random, packets: Sequence[bytes]) -> bytes:
+    """A packet with some bytes changed, cut out, repeated or joined to another's."""
+    data = bytearray(chance.choice(packets))
+    for _ in range(chance.choice((0, 1, 1, 2, 8))):
+        kind, place = chance.randrange(6), chance.randrange(len(data) + 1)
+        if kind <= 1 and place < len(data):
+            data[place] = chance.randrange(256)
+        elif kind == 2:
+            data[place : place + 4] = chance.choice((b"\xff" * 4, bytes(4), b"\x7f\xc0\0\0"))
+        elif kind == 3:
+            del data[place : place + chance.choice((1, 4, 16))]
+        elif kind == 4:
+            data[place:place] = data[place : place + chance.choice((4, 40))]
+        else:
+            data = data[:place] + bytearray(chance.choice(packets))[place:]
+    return bytes(data[:65535])
+
+
+@pytest.mark.parametrize("name", DECODERS)
+def test_damaged_packets_do_no_harm(name: str) -> None:
+    make, good = DECODERS[name]
+    decoder, packets = make(), good()
+    chance = random.Random(name)
+
+    def feed(numbers: range) -> int:
+        frames = 0
+        for number in numbers:
+            for frame in decoder.feed(damaged(chance, packets), 100.0 + number * STEP):
+                frames += 1
+                known = ~np.isnan(frame.positions[:, 0])
+                assert frame.positions.shape == (len(decoder.skeleton.names), 3)
+                assert np.isfinite(frame.positions[known]).all()
+                assert (known == (frame.confidence > 0.0)).all()
+                assert frame.time <= frame.arrival
+        return frames
+
+    assert feed(range(MUTATIONS)) > 0
+    assert decoder.refused > 0
+    tracemalloc.start()
+    try:
+        feed(range(MUTATIONS, MUTATIONS + TRACED))
+        grown = tracemalloc.get_traced_memory()[0]
+    finally:
+        tracemalloc.stop()
+    assert grown < 200 * TRACED  # bytes
+    again = [f for k in range(30) for f in decoder.feed(packets[0], 1e6 + k * 0.1)]
+    assert len(again) > 0  # it still hears a sender that means well
