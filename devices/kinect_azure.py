@@ -131,21 +131,21 @@ def read_sight(data: bytes) -> Sight:
     size = ctypes.sizeof(Header) + min(header.bodies, MOST_BODIES) * ctypes.sizeof(AzureBody)
     if header.bodies > MOST_BODIES or len(data) != size:
         raise ValueError(f"expected {header.bodies} bodies, got {len(data)} bytes")
-    bodies = (AzureBody * header.bodies).from_buffer_copy(data, ctypes.sizeof(Header))
+    bodies = np.frombuffer(data, np.dtype(AzureBody), offset=ctypes.sizeof(Header))
     return Sight(
         time=header.time * 1e-6,
-        bodies=[_body(body) for body in bodies if body.id != INVALID_ID],
+        bodies=[_body(body) for body in bodies if body["id"] != INVALID_ID],
         up=np.array(header.up, dtype=np.float64),
     )
 
 
-def _body(body: AzureBody) -> Body:
-    table = np.frombuffer(body.joints, np.float32).reshape(JOINTS, 8).astype(np.float64)
-    levels = np.frombuffer(body.joints, np.uint32).reshape(JOINTS, 8)[:, 7]
+def _body(body: np.void) -> Body:
+    joints = body["joints"]
+    levels = joints["confidence"]
     return Body(
-        id=body.id,
-        positions=table[:, :3] * 1e-3,
-        rotations=table[:, [4, 5, 6, 3]],
+        id=int(body["id"]),
+        positions=joints["position"].astype(np.float64) * 1e-3,
+        rotations=joints["orientation"][:, [1, 2, 3, 0]].astype(np.float64),
         confidence=np.where(levels > 3, 0.0, CONFIDENCE_OF_LEVEL[np.minimum(levels, 3)]),
     )
 

@@ -9,7 +9,7 @@ there is none.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,6 +102,7 @@ class KinectDecoder:
         """The sensor's joints."""
         return self._sensor.skeleton
 
+    @np.errstate(over="ignore", invalid="ignore")  # whatever a damaged packet holds
     def feed(self, data: bytes, arrival: float) -> Sequence[SkeletonFrame]:
         """A frame of each person in the SDK's frame `data` that came at `arrival` [s]."""
         try:
@@ -133,7 +134,7 @@ class KinectDecoder:
         return SkeletonFrame(
             time=time,
             positions=body.positions @ turn.T + [0.0, height, 0.0],
-            rotations=_turned(body.rotations, turn),
+            rotations=_turned(body.rotations, turn @ self._sensor.to_world),
             confidence=body.confidence,
             performer=number,
             arrival=arrival,
@@ -147,25 +148,23 @@ def _middle(body: Body) -> Array:
 
 
 def _in_world(body: Body, to_world: Array) -> Body:
-    """The body in our axes; NaN and confidence 0 where nothing can be there."""
-    with np.errstate(invalid="ignore"):
-        near = (np.abs(body.positions) < FURTHEST).all(axis=1)  # False for NaN
-        seen = near & (body.confidence > 0.0) & (body.positions != 0.0).any(axis=1)
+    """The body with its places, not yet its turns, in our axes; NaN and confidence 0 where nothing
+    can be there."""
+    near = (np.abs(body.positions) < FURTHEST).all(axis=1)  # False for NaN
+    seen = near & (body.confidence > 0.0) & (body.positions != 0.0).any(axis=1)
     positions = np.full_like(body.positions, np.nan)
     positions[seen] = body.positions[seen] @ to_world.T
-    return Body(
-        id=body.id,
+    return replace(
+        body,
         positions=positions,
-        rotations=_turned(body.rotations, to_world),
         confidence=np.where(seen, np.clip(body.confidence, 0.0, 1.0), 0.0),
     )
 
 
 def _turned(rotations: Array, turn: Array) -> Array:
     """Rotations (J, 4) with `turn` (3, 3) after them; NaN where one is no rotation."""
-    with np.errstate(invalid="ignore", over="ignore"):
-        length = np.linalg.norm(rotations, axis=1)
-        known = (length > 0.5) & (length < 2.0)  # False for NaN
+    length = np.linalg.norm(rotations, axis=1)
+    known = (length > 0.5) & (length < 2.0)  # False for NaN
     out = np.full_like(rotations, np.nan)
     if known.any():
         out[known] = (Rotation.from_matrix(turn) * Rotation.from_quat(rotations[known])).as_quat()

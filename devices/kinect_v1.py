@@ -9,6 +9,7 @@ from __future__ import annotations
 import ctypes
 
 import numpy as np
+from numpy.typing import NDArray
 
 from devices.errors import InputError
 from devices.kinect_bodies import Body, Sensor, Sight
@@ -90,6 +91,9 @@ class Packet(ctypes.Structure):
     )
 
 
+_PACKET = np.dtype(Packet)
+
+
 def read_sight(data: bytes) -> Sight:
     """What the bytes of a `Packet` show.
 
@@ -98,30 +102,26 @@ def read_sight(data: bytes) -> Sight:
     """
     if len(data) != ctypes.sizeof(Packet):
         raise ValueError(f"expected {ctypes.sizeof(Packet)} bytes, got {len(data)}")
-    packet = Packet.from_buffer_copy(data)
-    floor = np.array(packet.frame.floor.values, dtype=np.float64)
+    packet = np.frombuffer(data, _PACKET)[0]
+    frame, bones = packet["frame"], packet["bones"]
+    people = frame["people"]
+    tracked = (people["tracking_state"] == _TRACKED) & (people["tracking_id"] != 0)
+    floor = frame["floor"]["values"].astype(np.float64)
     return Sight(
-        time=packet.frame.time * _MILLISECOND,
-        bodies=[
-            _body(person, bones)
-            for person, bones in zip(packet.frame.people, packet.bones, strict=True)
-            if person.tracking_state == _TRACKED and person.tracking_id
-        ],
+        time=float(frame["time"]) * _MILLISECOND,
+        bodies=[_body(people[slot], bones[slot]) for slot in np.flatnonzero(tracked)],
         up=floor[:3],
         height=float(floor[3]) if floor[:3].any() else float("nan"),
     )
 
 
-def _body(person: SkeletonData, bones: ctypes.Array[BoneOrientation]) -> Body:
-    states = np.array(person.states)
-    positions = np.frombuffer(person.positions, np.float32).reshape(JOINTS, 4)
+def _body(person: np.void, bones: NDArray[np.void]) -> Body:
+    states, ends = person["states"], bones["end"]
     rotations = np.zeros((JOINTS, 4))
-    for bone in bones:
-        if bone.end < JOINTS:
-            rotations[bone.end] = bone.absolute.quaternion.values
+    rotations[ends[ends < JOINTS]] = bones["absolute"]["quaternion"]["values"][ends < JOINTS]
     return Body(
-        id=person.tracking_id,
-        positions=positions[:, :3].astype(np.float64),
+        id=int(person["tracking_id"]),
+        positions=person["positions"]["values"][:, :3].astype(np.float64),
         rotations=rotations,
         confidence=np.where(states > 2, 0.0, CONFIDENCE_OF_STATE[np.minimum(states, 2)]),
     )

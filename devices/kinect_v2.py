@@ -14,6 +14,7 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from devices.errors import InputError
 from devices.kinect_bodies import Body, Sensor, Sight
@@ -79,6 +80,9 @@ class Packet(ctypes.Structure):
     )
 
 
+_PACKET = np.dtype(Packet)
+
+
 def read_sight(data: bytes) -> Sight:
     """What the bytes of a `Packet` show.
 
@@ -87,28 +91,32 @@ def read_sight(data: bytes) -> Sight:
     """
     if len(data) != ctypes.sizeof(Packet):
         raise ValueError(f"expected {ctypes.sizeof(Packet)} bytes, got {len(data)}")
-    packet = Packet.from_buffer_copy(data)
-    floor = np.array(packet.floor, dtype=np.float64)
+    packet = np.frombuffer(data, _PACKET)[0]
+    floor = packet["floor"].astype(np.float64)
+    bodies = packet["bodies"]
     return Sight(
-        time=packet.time * _TICK,
-        bodies=[_body(body) for body in packet.bodies if body.tracked],
+        time=float(packet["time"]) * _TICK,
+        bodies=[_body(bodies[slot]) for slot in np.flatnonzero(bodies["tracked"])],
         up=floor[:3],
         height=float(floor[3]) if floor[:3].any() else float("nan"),
     )
 
 
-def _body(body: TrackedBody) -> Body:
-    positions = np.zeros((JOINTS, 3))
-    rotations = np.zeros((JOINTS, 4))
+def _body(body: np.void) -> Body:
+    positions, rotations = np.zeros((JOINTS, 3)), np.zeros((JOINTS, 4))
     confidence = np.zeros(JOINTS)
-    for joint in body.joints:
-        if 0 <= joint.type < JOINTS and 0 <= joint.state <= 2:
-            positions[joint.type] = joint.position
-            confidence[joint.type] = CONFIDENCE_OF_STATE[joint.state]
-    for turn in body.orientations:
-        if 0 <= turn.type < JOINTS:
-            rotations[turn.type] = turn.orientation
-    return Body(body.id, positions, rotations, confidence)
+    joints, turns = body["joints"], body["orientations"]
+    states = joints["state"]
+    joints = joints[_is_joint(joints["type"]) & (states >= 0) & (states <= 2)]
+    positions[joints["type"]] = joints["position"]
+    confidence[joints["type"]] = CONFIDENCE_OF_STATE[joints["state"]]
+    turns = turns[_is_joint(turns["type"])]
+    rotations[turns["type"]] = turns["orientation"]
+    return Body(int(body["id"]), positions, rotations, confidence)
+
+
+def _is_joint(types: NDArray[np.int32]) -> NDArray[np.bool_]:
+    return (types >= 0) & (types < JOINTS)
 
 
 SENSOR = Sensor(KINECT_V2, KINECT_TO_WORLD, ("FootLeft", "FootRight"), read_sight)

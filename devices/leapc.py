@@ -8,7 +8,7 @@ device axes; quaternions (x, y, z, w); a clock in microseconds that is the host'
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from urllib.parse import SplitResult
 
 import numpy as np
@@ -48,7 +48,13 @@ _TIMEOUT = 0xE2010004
 _BACKGROUND_FRAMES = 0x1
 _CONNECTION, _CONNECTION_LOST, _TRACKING, _DEVICE_LOST = 0x1, 0x2, 0x100, 0x104
 _LEFT = 0
-_BONES = ("metacarpal", "mcp", "pip", "dip")  # the joint where each bone of a finger starts
+# Of each joint where a finger's bone starts: which finger and which of its four bones.
+_STARTS = {
+    f"{finger}_{joint}": (row, bone)
+    for row, finger in enumerate(FINGERS)
+    for bone, joint in enumerate(("mcp", "pip", "dip"), 1)
+    if f"{finger}_{joint}" in HAND_PARENTS
+}
 
 
 class Bone(ctypes.Structure):
@@ -160,6 +166,7 @@ class LeapCDecoder:
         """Both hands, or the one that was asked for."""
         return self._performer.skeleton
 
+    @np.errstate(over="ignore", invalid="ignore")  # whatever a damaged packet holds
     def feed(self, data: bytes, arrival: float) -> Sequence[SkeletonFrame]:
         """The frame in a `Header` and its hands that came at `arrival` [s]."""
         header = Header()
@@ -170,56 +177,51 @@ class LeapCDecoder:
         if len(data) != size or header.hands > MOST_HANDS:
             self.refused += 1
             return []
-        hands = (LeapHand * header.hands).from_buffer_copy(data, ctypes.sizeof(Header))
+        hands = np.frombuffer(data, np.dtype(LeapHand), offset=ctypes.sizeof(Header))
         seen = [hand for hand in map(_hand, hands) if PALM in hand.joints]
         time = self._clock.host_time(header.time * 1e-6, arrival)
         return [self._performer.frame(seen, time, arrival)]
 
 
-def _hand(found: LeapHand) -> Hand:
+def _hand(found: np.void) -> Hand:
     """A hand as the WebSocket would tell of it; what is no number is not there."""
-    joints: dict[str, Array] = {
-        PALM: np.array(found.palm.position, dtype=np.float64),
-        "elbow": np.array(found.arm.start, dtype=np.float64),
-        "wrist": np.array(found.arm.end, dtype=np.float64),
+    bones, palm = found["digits"]["bones"], found["palm"]
+    starts = bones["start"].astype(np.float64)  # (5, 4, 3)
+    places = {name: starts[finger, bone] for name, (finger, bone) in _STARTS.items()}
+    turns = {name: bones["rotation"][finger, bone] for name, (finger, bone) in _STARTS.items()}
+    for finger, end in zip(FINGERS, bones["end"][:, -1].astype(np.float64), strict=True):
+        places[f"{finger}_tip"] = end
+        turns[f"{finger}_tip"] = turns[f"{finger}_dip"]
+    places |= {
+        PALM: palm["position"].astype(np.float64),
+        "elbow": found["arm"]["start"].astype(np.float64),
+        "wrist": found["arm"]["end"].astype(np.float64),
     }
-    turns = {"elbow": found.arm.rotation, "wrist": found.arm.rotation}
-    for finger, digit in zip(FINGERS, found.digits, strict=True):
-        for joint, bone in zip(_BONES, digit.bones, strict=True):
-            joints[f"{finger}_{joint}"] = np.array(bone.start, dtype=np.float64)
-            turns[f"{finger}_{joint}"] = bone.rotation
-        joints[f"{finger}_tip"] = np.array(digit.bones[-1].end, dtype=np.float64)
-        turns[f"{finger}_tip"] = digit.bones[-1].rotation
-    direction, normal = (
-        np.array(axis, dtype=np.float64) for axis in (found.palm.direction, found.palm.normal)
-    )
-    palm, known = rotations(palm_basis(direction, normal)[None])
+    turns |= {"elbow": found["arm"]["rotation"], "wrist": found["arm"]["rotation"]}
+    direction, normal = palm["direction"].astype(np.float64), palm["normal"].astype(np.float64)
+    near = (np.abs(np.array(list(places.values()))) <= FARTHEST_MM).all(axis=1)  # False for NaN
     return Hand(
-        id=found.id,
-        side="left" if found.type == _LEFT else "right",
-        confidence=_share(found.confidence),
-        joints={
-            name: place
-            for name, place in joints.items()
-            if name in HAND_PARENTS and (np.abs(place) <= FARTHEST_MM).all()
-        },
+        id=int(found["id"]),
+        side="left" if found["type"] == _LEFT else "right",
+        confidence=_share(float(found["confidence"])),
+        joints={name: places[name] for name, good in zip(places, near, strict=True) if good},
         direction=direction,
         normal=normal,
-        bases=_bases(turns) | ({PALM: palm[0]} if known[0] else {}),
+        bases=_bases(turns, palm_basis(direction, normal)),
     )
 
 
-def _bases(turns: dict[str, ctypes.Array[ctypes.c_float]]) -> dict[str, Array]:
-    quaternions = np.array([list(turn) for turn in turns.values()])
-    with np.errstate(over="ignore", invalid="ignore"):
-        length = np.linalg.norm(quaternions, axis=1)
-        known = (length > 0.5) & (length < 2.0)  # a bone without length has none
-    names = [name for name, good in zip(turns, known, strict=True) if good]
-    if not names:
-        return {}
-    matrices = Rotation.from_quat(quaternions[known]).as_matrix()
-    found = dict(zip(names, matrices, strict=True))
-    return {name: basis for name, basis in found.items() if name in HAND_PARENTS}
+def _bases(turns: Mapping[str, NDArray[np.float32]], palm: Array) -> dict[str, Array]:
+    quaternions = np.array(list(turns.values()), dtype=np.float64)
+    length = np.linalg.norm(quaternions, axis=1)
+    known = (length > 0.5) & (length < 2.0)  # a bone without length has none
+    found: dict[str, Array] = {}
+    if known.any():
+        matrices = Rotation.from_quat(quaternions[known]).as_matrix()
+        names = [name for name, good in zip(turns, known, strict=True) if good]
+        found = dict(zip(names, matrices, strict=True))
+    (turned,), (square,) = rotations(palm[None])
+    return found | ({PALM: turned} if square else {})
 
 
 def _share(confidence: float) -> float:
