@@ -20,7 +20,7 @@ from replay.builtin import builtin_recording
 from replay.recording import Recording
 from runtime.character import Character
 from runtime.characters.builtin import builtin_character
-from runtime.characters.proxy import DENSE, Proxy, proxy_of
+from runtime.characters.proxy import DENSE, PROXY, Proxy, proxy_of
 from runtime.director import Choices, Director
 from runtime.performer import Performer
 from runtime.puppet import Puppet
@@ -44,7 +44,7 @@ Ints = NDArray[np.int64]
 Figures = dict[str, float]
 
 
-def run(sizes: Sequence[int] = SIZES) -> dict[str, object]:
+def run(sizes: Sequence[int] = SIZES, frames: int = FRAMES) -> dict[str, object]:
     """Print a table and return it: milliseconds a tick at the median, and the error."""
     print(f"dense: {ITERATIONS} iterations a tick, {get_num_threads()} threads, proxy over {DENSE}")
     print(
@@ -54,7 +54,8 @@ def run(sizes: Sequence[int] = SIZES) -> dict[str, object]:
     )
     rows = []
     for size in sizes:
-        row = measure(dense_character(size), builtin_recording(), settle=size <= MOST_SETTLED)
+        settle = size <= MOST_SETTLED
+        row = measure(dense_character(size), builtin_recording(), settle=settle, frames=frames)
         rows.append(row)
         print(_line(row), flush=True)
     return {"threads": get_num_threads(), "iterations": ITERATIONS, "sizes": rows}
@@ -109,7 +110,7 @@ def measure(
         frames: from the start of the recording.
     """
     start = perf_counter()
-    proxy = proxy_of(character, dense=0, count=min(9_000, len(character.vertices) // 2))
+    proxy = proxy_of(character, dense=0, count=min(PROXY, len(character.vertices) // 2))
     handles = _perform(character, proxy, recording, frames)
     coarse = ArapSolver(proxy.vertices, proxy.faces, handles.chosen, groups=handles.groups)
     built = perf_counter()
