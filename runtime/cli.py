@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import importlib
 import io
+import math
 import os
 import sys
 from collections.abc import Callable, Sequence
@@ -61,6 +62,28 @@ def whole(text: str) -> int:
     return int(text)
 
 
+def share(text: str) -> float:
+    """A number from 0 to 1."""
+    return _between(text, 0.0, 1.0)
+
+
+def gain(text: str) -> float:
+    """A number from 0 to 10."""
+    return _between(text, 0.0, 10.0)
+
+
+def _between(text: str, least: float, most: float) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not least <= value <= most:
+        raise argparse.ArgumentTypeError(
+            f"expected a number from {least:g} to {most:g}, got {text!r}"
+        )
+    return value
+
+
 def host_port(text: str) -> tuple[str, int | None]:
     """A host and a port from ``HOST:PORT``; None where there is no port."""
     host, colon, port = text.rpartition(":") if text.count(":") == 1 else (text, "", "")
@@ -100,6 +123,14 @@ def _add_show_options(parser: argparse.ArgumentParser) -> None:
         "right-arm, hand, ... or joint names with commas between",
     )
     match.add_argument(
+        "--performers",
+        type=counting,
+        default=1,
+        metavar="N",
+        help="who comes as number K drives character K; the last of N all that are left "
+        "(default 1: who comes first drives all)",
+    )
+    match.add_argument(
         "--match", type=counting, default=1, metavar="N", help="take the N-th best match"
     )
     match.add_argument(
@@ -118,6 +149,21 @@ def _add_show_options(parser: argparse.ArgumentParser) -> None:
         default=2,
         metavar="N",
         help="ARAP iterations a frame (default 2)",
+    )
+    made = parser.add_argument_group("what characters are made of")
+    made.add_argument(
+        "--cartoon",
+        type=share,
+        default=0.0,
+        metavar="X",
+        help="0 (default) keeps every part rigid, 1 lets it squash and stretch with its motion",
+    )
+    made.add_argument(
+        "--volume-gain",
+        type=gain,
+        default=1.0,
+        metavar="X",
+        help="how much of the volume is kept when it does; more than 1 exaggerates (default 1)",
     )
     keep = parser.add_argument_group("what is kept")
     keep.add_argument("--video", type=Path, metavar="OUT.mp4")

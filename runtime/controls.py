@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from devices.stream import SkeletonStream
 from replay.player import Player
 from runtime.conditioning.switches import Conditioning, filled_only
-from runtime.director import Director
+from runtime.ensemble import Cues
 from runtime.theatre import Theatre
 from runtime.window import Event, KeyPressed, Resized, Window
 
@@ -56,7 +56,7 @@ class Controls:
         self,
         window: Window,
         theatre: Theatre,
-        director: Director,
+        director: Cues,
         stream: SkeletonStream,
         conditioning: Conditioning | None = None,
     ) -> None:

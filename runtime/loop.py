@@ -7,7 +7,7 @@ and of GL while a performance runs.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from devices.skeleton import SkeletonFrame
@@ -16,6 +16,7 @@ from runtime.clock import StageTimer
 from runtime.conditioning.reception import Reception
 from runtime.conditioning.switches import Conditioning, filled_only
 from runtime.director import Director
+from runtime.ensemble import Act
 from runtime.lead import Lead
 from runtime.output.output import Output, PerformedFrame
 from runtime.output.report import Report
@@ -45,12 +46,15 @@ class FrameLoop:
         report: what the show is told by.
         theatre: where it is shown, or None when nobody looks and no output needs a picture.
         outputs: for each puppet, what keeps its performance.
+        others: further performers' acts, in the order in which they come; outputs and theatre have
+            their puppets after these.
         conditioning: how the stream is put in order; as it comes where None.
         recorder: what keeps the performer's frames as they come, or None.
         shown: whether somebody looks, so that every tick is drawn.
 
     Attributes:
         frames: frames performed so far.
+        received: frames that came so far.
         seconds: performer's time from the first of them to the last [s].
     """
 
@@ -64,17 +68,16 @@ class FrameLoop:
         report: Report,
         theatre: Theatre | None,
         outputs: Sequence[Sequence[Output]],
+        others: Sequence[Act] = (),
         conditioning: Conditioning | None = None,
         recorder: Recorder | None = None,
         shown: bool = False,
     ) -> None:
-        self.frames = 0
+        self.frames = self.received = 0
         self.seconds = 0.0
         self._began = float("nan")
         self._stream = stream
-        self._performer = performer
-        self._puppets = puppets
-        self._director = director
+        self._acts = (Act(performer, puppets, director), *others)
         self._report = report
         self._theatre = theatre
         self._outputs = outputs
@@ -84,10 +87,10 @@ class FrameLoop:
         self._picture_step = EARLY / rate if rate > 0.0 else math.inf  # [s]
         self._pictured = -math.inf
         self._reception = Reception(stream.skeleton, conditioning or filled_only())
-        self._lead = Lead()
+        self._lead = Lead(len(self._acts))
         self._timer = StageTimer()
-        self._pose: Pose | None = None
-        self._motions: list[Motion] = [puppet.deform() for puppet in puppets]
+        self._poses: list[Pose | None] = [None] * len(self._acts)
+        self._motions = [puppet.deform() for act in self._acts for puppet in act.puppets]
 
     def tick(self) -> bool:
         """Do what has come since the last tick; draw in any case where somebody looks.
@@ -98,44 +101,50 @@ class FrameLoop:
         self._timer.reset()
         with self._timer.stage("frame"):
             with self._timer.stage("poll"):
-                newest, leads = self._receive()
+                newest, parts = self._receive()
             if newest is not None:
-                self._perform(newest, leads)
+                self._perform(newest, parts)
             elif self._shown and self._theatre is not None:
-                self._theatre.show(self._pose, self._motions)
+                self._theatre.show(self._poses[0], self._motions)
         if newest is not None:
             for stage, spent in self._timer.stages.items():
                 self._report.times.add(stage, spent)
         return newest is not None
 
-    def _receive(self) -> tuple[SkeletonFrame | None, bool]:
-        """The lead's newest frame, else anyone's; the recorder gets every one, as it came."""
+    def _receive(self) -> tuple[SkeletonFrame | None, dict[int, SkeletonFrame]]:
+        """The newest frame, and that of each part; the recorder gets every one, as it came."""
         came = self._stream.poll()
         if self._recorder is not None:
             for frame in came:
                 self._recorder.write(frame)
         frames = self._reception.receive(came)
-        leading = [frame for frame in frames if self._lead.leads(frame)]
-        self._report.dropped += len(came) - min(len(frames), 1)
-        if leading:
-            return leading[-1], True
-        return (frames[-1] if frames else None), False
+        parts = {}
+        for frame in frames:
+            part = self._lead.part(frame)
+            if part is not None:
+                parts[part] = frame
+        newest = parts.get(0, next(iter(parts.values()), frames[-1] if frames else None))
+        self.received += len(came)
+        self._report.dropped += len(came) - max(len(parts), min(len(frames), 1))
+        return newest, parts
 
-    def _perform(self, frame: SkeletonFrame, leads: bool) -> None:
+    def _perform(self, frame: SkeletonFrame, parts: Mapping[int, SkeletonFrame]) -> None:
         timer = self._timer
-        if leads:
-            with timer.stage("match"):
-                self._pose = self._performer.follow(frame)
-                if self._performer.calibrates:
-                    self._director.calibrate()
-                self._director.direct(frame)
-        motions = []
-        for puppet in self._puppets:
-            with timer.stage("retarget"):
-                if self._pose is not None:
-                    puppet.follow(self._pose)
-            with timer.stage("deform"):
-                motions.append(puppet.deform())
+        motions: list[Motion] = []
+        for part, act in enumerate(self._acts):
+            if part in parts:
+                with timer.stage("match"):
+                    self._poses[part] = act.performer.follow(parts[part])
+                    if act.performer.calibrates:
+                        act.director.calibrate()
+                    act.director.direct(parts[part])
+            pose = self._poses[part]
+            for puppet in act.puppets:
+                with timer.stage("retarget"):
+                    if pose is not None:
+                        puppet.follow(pose)
+                with timer.stage("deform"):
+                    motions.append(puppet.deform())
         self._motions = motions
         self._publish(frame.time)
         self._began = frame.time if self.frames == 0 else self._began
@@ -148,7 +157,7 @@ class FrameLoop:
         picture = None
         with self._timer.stage("render"):
             if self._theatre is not None and (self._shown or wanted):
-                self._theatre.show(self._pose, self._motions)
+                self._theatre.show(self._poses[0], self._motions)
             if self._theatre is not None and wanted:
                 picture = self._theatre.picture()
                 self._pictured = time

@@ -21,6 +21,7 @@ def rehearse(
     source: str,
     director: Director,
     conditioning: Conditioning | None = None,
+    part: int = 0,
 ) -> Array | None:
     """Let the director choose matches and rest states from poses of the whole recording.
 
@@ -33,12 +34,16 @@ def rehearse(
         director: who chooses.
         conditioning: what is done to the frames first, as for `Performer`, so that no glitch of
             the sensor is taken for a pose.
+        part: which performer, by the order in which they come; 0 is the lead.
 
     Returns:
         (A, 2, 3) [m] for each puppet the corners of all that it fills, for the camera; None when
         nothing was chosen.
     """
-    lead = np.flatnonzero(recording.performers == recording.performers[0])
+    who, first = np.unique(recording.performers, return_index=True)
+    if part >= len(who):
+        return None
+    lead = np.flatnonzero(recording.performers == who[np.argsort(first)[part]])
     chosen = np.unique(np.linspace(0, len(lead) - 1, POSES).round().astype(int))
     performer = Performer(recording.skeleton, source, conditioning)
     poses = []

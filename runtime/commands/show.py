@@ -10,6 +10,10 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
+from devices.errors import InputError
 from devices.stream import SkeletonStream, open_stream
 from replay.builtin import builtin_recording
 from replay.formats import read_recording
@@ -19,15 +23,16 @@ from replay.recorder import Recorder
 from replay.recording import Recording
 from runtime.cast import character_named
 from runtime.characters.builtin import BUILTIN
-from runtime.clock import Ticker
 from runtime.commands.outputs import check_outputs, open_outputs
 from runtime.conditioning.switches import asked_for, for_live, for_recording
 from runtime.controls import Controls
 from runtime.director import Choices, Director
+from runtime.ensemble import Act, Ensemble
 from runtime.interrupt import held
 from runtime.loop import FrameLoop
 from runtime.mapping import Mapping, read_mapping
 from runtime.output.report import MatchedPair, Report
+from runtime.pacing import TICKS, pace_of
 from runtime.performer import Performer
 from runtime.progress import Progress
 from runtime.provenance import provenance
@@ -35,11 +40,11 @@ from runtime.puppet import Puppet
 from runtime.rehearsal import rehearse
 from runtime.render.camera import front_camera
 from runtime.render.context import headless_context, release_headless
+from runtime.skin import Elasticity
 from runtime.theatre import Theatre
 from runtime.warn import warn
 from runtime.window import Window
 
-TICKS = 60.0  # a second, where nothing else sets the pace
 STEADY = 1.0  # seconds that a live match stands before it performs by itself
 
 
@@ -122,17 +127,19 @@ class _Show:
         self._report = Report(options.report)
         self._parts = [self._report.cast(character) for character in characters]
         self._puppets = [Puppet(one, iterations=options.iterations) for one in characters]
+        for puppet in self._puppets:
+            puppet.skin.elasticity = Elasticity(options.cartoon, options.volume_gain)
         self._window = None
         if not options.headless:
             self._window = closing.enter_context(Window("Bunraku", options.size))
         self._theatre = self._open_theatre()
-        self._director = self._call_director()
+        self._acts = self._call_acts()
 
     def run(self) -> None:
         """Perform until the stream ends or the window is closed."""
         options, recording = self._options, self._source.recording
         if recording is not None:
-            filled = rehearse(recording, options.source, self._director, self._conditioning)
+            filled = self._rehearse(recording)
             if self._theatre is not None:
                 self._theatre.frame_all(filled)
         with held():
@@ -142,10 +149,9 @@ class _Show:
         controls = None
         if self._window is not None and self._theatre is not None:
             played = self._source.stream
-            controls = Controls(
-                self._window, self._theatre, self._director, played, self._conditioning
-            )
-        ticker = None if options.fast else Ticker(TICKS)
+            cues = Ensemble([act.director for act in self._acts])
+            controls = Controls(self._window, self._theatre, cues, played, self._conditioning)
+        pace = None if options.fast else pace_of(self._source.stream)
         while not self._stream.ended and not (controls is not None and controls.leaving):
             with held():  # so that all outputs have the same frames
                 performed = loop.tick()
@@ -154,8 +160,8 @@ class _Show:
             if controls is not None:
                 controls.present()
                 controls.serve()
-            if ticker is not None:
-                ticker.wait()
+            if pace is not None:
+                pace.wait()
 
     def _open_loop(self) -> FrameLoop:
         """The loop with all that keeps the show; opened last, when nothing else can fail."""
@@ -166,9 +172,10 @@ class _Show:
         ]
         loop = FrameLoop(
             self._stream,
-            self._performer,
-            self._puppets,
-            director=self._director,
+            self._acts[0].performer,
+            self._acts[0].puppets,
+            director=self._acts[0].director,
+            others=self._acts[1:],
             report=self._report,
             theatre=self._theatre,
             outputs=open_outputs(
@@ -216,7 +223,35 @@ class _Show:
         self._closing.callback(theatre.close)
         return theatre
 
-    def _call_director(self) -> Director:
+    def _call_acts(self) -> list[Act]:
+        """Give each performer their characters: one each, all that are left to the last."""
+        count = self._options.performers
+        if count > len(self._puppets):
+            raise InputError(
+                f"--performers {count} needs as many characters, got {len(self._puppets)}; give "
+                "--character more often"
+            )
+        acts = []
+        for part in range(count):
+            puppets = self._puppets[part : None if part == count - 1 else part + 1]
+            performer = self._performer
+            if part > 0:
+                performer = Performer(
+                    self._stream.skeleton, self._options.source, self._conditioning
+                )
+            acts.append(Act(performer, puppets, self._call_director(performer, puppets)))
+        return acts
+
+    def _rehearse(self, recording: Recording) -> NDArray[np.float64] | None:
+        """Let each act choose poses of the recording; corners of all that they fill, or None."""
+        filled = [
+            rehearse(recording, self._options.source, act.director, self._conditioning, part)
+            for part, act in enumerate(self._acts)
+        ]
+        known = [corners for corners in filled if corners is not None]
+        return np.concatenate(known) if len(known) == len(filled) else None
+
+    def _call_director(self, performer: Performer, puppets: list[Puppet]) -> Director:
         options = self._options
         # Only who sits at the window can walk round the stage; a camera that merely steps back to
         # have all in view would turn by a rounding error, and the bytes of a cache with it.
@@ -224,12 +259,12 @@ class _Show:
         by_hand: list[Mapping | None] = [
             None
             if options.mapping is None
-            else read_mapping(options.mapping, self._performer.skeleton, one.character.skeleton)
-            for one in self._puppets
+            else read_mapping(options.mapping, performer.skeleton, one.character.skeleton)
+            for one in puppets
         ]
         return Director(
-            self._performer,
-            self._puppets,
+            performer,
+            puppets,
             lambda: (front if theatre is None else theatre.camera).view_rotation,
             Choices(options.match, options.chains == "extend", options.flip, self._source.patience),
             by_hand,
@@ -240,7 +275,7 @@ class _Show:
         names = self._performer.skeleton.names
         recording = self._source.recording
         if recording is None:
-            frames, seconds = loop.frames + self._report.dropped, loop.seconds
+            frames, seconds = loop.received, loop.seconds
         else:
             frames, seconds = len(recording), recording.seconds
         self._report.recorded(frames=frames, joints=len(names), seconds=seconds)

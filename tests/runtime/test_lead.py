@@ -15,7 +15,7 @@ def frame(performer: int, time: float) -> SkeletonFrame:
 
 def leads(*frames: tuple[int, float]) -> list[bool]:
     lead = Lead()
-    return [lead.leads(frame(performer, time)) for performer, time in frames]
+    return [lead.part(frame(performer, time)) == 0 for performer, time in frames]
 
 
 def test_the_first_seen_leads_whoever_else_comes() -> None:
@@ -40,3 +40,19 @@ def test_a_bystander_whose_clock_is_behind_does_not_take_over(late: float) -> No
 def test_a_clock_that_is_set_back_far_begins_anew() -> None:
     assert leads((1, 100.0), (2, 0.0), (2, 0.1)) == [True, True, True]
     assert leads((1, 100.0), (1, 0.0), (2, 0.1)) == [True, True, False]
+
+
+def parts(count: int, *frames: tuple[int, float]) -> list[int | None]:
+    lead = Lead(count)
+    return [lead.part(frame(performer, time)) for performer, time in frames]
+
+
+def test_parts_are_given_in_the_order_of_arrival_and_stay() -> None:
+    everybody = [(7, 0.0), (3, 0.0), (5, 0.0), (5, 0.1), (3, 0.1), (7, 0.1)]
+    assert parts(2, *everybody) == [0, 1, None, None, 1, 0]
+    assert parts(3, *everybody) == [0, 1, 2, 2, 1, 0]
+
+
+def test_the_part_of_one_who_left_goes_to_who_comes_next() -> None:
+    late = PATIENCE * 1.1
+    assert parts(2, (7, 0.0), (3, 0.0), (3, late), (5, late), (7, late)) == [0, 1, 1, 0, None]

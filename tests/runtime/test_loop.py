@@ -15,7 +15,9 @@ from devices.errors import InputError
 from devices.skeleton import SkeletonFrame
 from replay.player import EveryFrame, Player, RealTime
 from replay.recording import Recording
+from runtime.conditioning.switches import Conditioning, filled_only, for_live
 from runtime.director import Choices, Director
+from runtime.ensemble import Act
 from runtime.loop import FrameLoop
 from runtime.mapping import Mapping
 from runtime.output.output import PerformedFrame
@@ -24,7 +26,18 @@ from runtime.performer import Performer
 from runtime.puppet import Puppet
 from runtime.render.context import headless_context, release_headless
 from runtime.theatre import Theatre
-from tests.runtime.figures import ARMS, BODY, FRONT_VIEW, make_figure, pose, record, waving
+from tests.runtime.figures import (
+    ARMS,
+    BODY,
+    FRONT_VIEW,
+    NODES,
+    T_POSE,
+    make_figure,
+    pose,
+    record,
+    waving,
+)
+from tests.runtime.figures import frame as captured
 
 SIZE = (48, 27)
 
@@ -79,13 +92,14 @@ def context() -> Iterator[moderngl.Context]:
 
 
 def loop_of(  # what every show needs, with what a test cares for
-    player: Player,
+    player: Player | Wire,
     puppets: list[Puppet],
     outputs: list[list[Kept]],
     *,
     report: Report | None = None,
     theatre: Theatre | None = None,
     recorder: Tape | None = None,
+    conditioning: Conditioning | None = None,
     shown: bool = False,
 ) -> FrameLoop:
     for puppet in puppets:
@@ -102,11 +116,12 @@ def loop_of(  # what every show needs, with what a test cares for
         theatre=theatre,
         outputs=outputs,
         recorder=recorder,
+        conditioning=conditioning,
         shown=shown,
     )
 
 
-def play(loop: FrameLoop, player: Player) -> int:
+def play(loop: FrameLoop, player: Player | Wire) -> int:
     ticks = 0
     while not player.ended:
         ticks += loop.tick()
@@ -260,3 +275,99 @@ def test_who_looks_sees_every_tick(puppet: Puppet, context: moderngl.Context) ->
     assert not loop.tick()
     assert np.abs(theatre.picture().astype(int) - before).max() > 40
     theatre.close()
+
+
+def test_each_performer_drives_a_character_of_their_own(puppet: Puppet) -> None:
+    """The first waves, the second stands; then the bystander's character is the one that rests."""
+    other = Puppet(make_figure())
+    player, kept = Player(two_performers(5), EveryFrame()), [[Kept()], [Kept()]]
+    hands = [Mapping(ARMS)]
+    acts = []
+    for one in (puppet, other):
+        one.rest()
+        performer = Performer(BODY)
+        director = Director(performer, [one], lambda: FRONT_VIEW, Choices(), hands)
+        acts.append(Act(performer, [one], director))
+    report = Report(None)
+    loop = FrameLoop(
+        player,
+        acts[0].performer,
+        acts[0].puppets,
+        director=acts[0].director,
+        others=acts[1:],
+        report=report,
+        theatre=None,
+        outputs=kept,
+    )
+    play(loop, player)
+    moved = [np.ptp([frame.vertices[:, 1].max() for frame in output.frames]) for (output,) in kept]
+    assert moved[0] > 0.2
+    assert moved[1] < 0.02
+    assert loop.received == loop.frames == 10
+    assert report.dropped == 0
+
+
+class Wire:
+    """A live source that gives these frames, one a poll, as they are."""
+
+    skeleton = BODY
+
+    def __init__(self, frames: list[SkeletonFrame]) -> None:
+        self._frames = frames
+
+    @property
+    def ended(self) -> bool:
+        return not self._frames
+
+    def poll(self) -> list[SkeletonFrame]:
+        return [self._frames.pop(0)] if self._frames else []
+
+    def close(self) -> None: ...
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None: ...
+
+
+def test_a_stream_is_put_in_order_and_recorded_as_it_came(puppet: Puppet) -> None:
+    """Every frame comes twice, and half way the sender starts again with another number."""
+    clocks = [i / 10.0 + (100.0 if i < 5 else 0.0) for i in range(10)]
+    frames = [
+        captured(place, time, performer=3 if time >= 100.0 else 8)
+        for place, time in zip(waving(10), clocks, strict=True)
+        for _ in range(2)
+    ]
+    wire, kept, tape, report = Wire(list(frames)), Kept(), Tape(), Report(None)
+    loop = loop_of(wire, [puppet], [[kept]], report=report, recorder=tape, conditioning=for_live())
+    assert play(loop, wire) == 10
+    assert all(ours is theirs for ours, theirs in zip(tape.frames, frames, strict=True))
+    assert (loop.received, report.dropped) == (20, 10)
+    steps = np.diff([each.time for each in kept.frames])
+    assert (steps > 0.0).all()
+    assert steps.max() < 0.11
+    tops = [each.node_positions[:, 1].max() for each in kept.frames]
+    assert max(tops) > tops[0] + 0.2, "who came back goes on"
+
+
+def test_a_mirror_that_is_switched_turns_the_character_over(puppet: Puppet) -> None:
+    """As a character whose arms are alike stands the same on both sides, so it moves."""
+    switches = filled_only()
+    performer, tops = Performer(BODY, conditioning=switches), []
+    puppet.rest()
+    director = Director(performer, [puppet], lambda: FRONT_VIEW, Choices(), [Mapping(ARMS)])
+    names = list(NODES)
+    left, right = names.index("wrist.L"), names.index("wrist.R")
+    raised = pose(T_POSE | {"ShoulderLeft": (0.0, 0.0, 1.6)})
+    for index, (place, mirror) in enumerate(
+        [(pose(T_POSE), False), (raised, False), (raised, True), (raised, False)]
+    ):
+        switches.mirror = mirror
+        performer.follow(captured(place, index * 0.1))
+        director.direct(captured(place, index * 0.1))
+        puppet.follow(performer.pose)
+        nodes = puppet.deform().node_positions
+        tops.append((nodes[left, 1], nodes[right, 1]))
+    assert tops[1][0] > tops[0][0] + 0.3
+    np.testing.assert_allclose(tops[2], tops[1][::-1], atol=0.03)
+    np.testing.assert_allclose(tops[3], tops[1], atol=1e-9)
