@@ -28,6 +28,10 @@ class BridgeInbox(Protocol):
         """Every frame that waits, oldest first."""
         ...
 
+    def wait(self, seconds: float) -> bool:
+        """Sleep until a frame is there, at most so long; whether one is."""
+        ...
+
     @property
     def held_back(self) -> int:
         """Frames that the bridge must wait for to be taken."""
@@ -43,6 +47,7 @@ class NewestOfEach:
         self.dropped = 0
         self._frames: dict[int, SkeletonFrame] = {}
         self._lock = threading.Lock()
+        self._filled = threading.Event()
 
     def put(self, frames: Iterable[SkeletonFrame]) -> None:
         """Add frames, the newest last."""
@@ -53,12 +58,19 @@ class NewestOfEach:
                     self._frames.pop(next(iter(self._frames)))
                     self.dropped += 1
                 self._frames[frame.performer] = frame
+            if self._frames:
+                self._filled.set()
+
+    def wait(self, seconds: float) -> bool:
+        """Sleep until a frame is there, at most so long; whether one is."""
+        return self._filled.wait(seconds)
 
     def take(self) -> list[SkeletonFrame]:
         """One frame of each performer that has moved, oldest first."""
         with self._lock:
             frames = list(self._frames.values())
             self._frames.clear()
+            self._filled.clear()
         return frames
 
 

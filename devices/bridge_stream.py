@@ -78,7 +78,6 @@ class BridgeStream:
         self._last_seen = float("nan")
         self._handshake = Handshake.DONE
         self._closing = threading.Event()
-        self._came = threading.Event()  # a frame
         self._told = threading.Event()  # the skeleton, or why there will be none
         self._context: Context = zmq.Context()
         self._socket = bridge_socket(self._context, zmq.DEALER, bridge.endpoint, bridge.keys)
@@ -128,18 +127,16 @@ class BridgeStream:
 
     def poll(self) -> Sequence[SkeletonFrame]:
         """What has come since the last poll, oldest first; never blocks."""
-        self._came.clear()
         return [] if self.ended else self._inbox.take()
 
     def wait(self, seconds: float) -> bool:
         """Sleep until a frame is there, at most so long; whether one is."""
-        return self._came.wait(seconds)
+        return self._inbox.wait(seconds)
 
     def close(self) -> None:
         """Hang up; may be called twice."""
         if not self._closing.is_set():
             self._closing.set()
-            self._came.set()
             self._thread.join()
 
     def __enter__(self) -> Self:
@@ -223,8 +220,6 @@ class BridgeStream:
                 listener(frame)
         self._frames += len(frames)
         self._inbox.put(frames)
-        if frames:
-            self._came.set()
         if self._receiver.skeleton is not None or self._receiver.other_version is not None:
             self._told.set()
 

@@ -26,6 +26,7 @@ class Inbox:
         self.dropped = 0
         self._frames: deque[SkeletonFrame] = deque(maxlen=capacity)
         self._lock = threading.Lock()
+        self._filled = threading.Event()
 
     def put(self, frames: Iterable[SkeletonFrame]) -> None:
         """Add frames, the newest last."""
@@ -33,10 +34,17 @@ class Inbox:
             for frame in frames:
                 self.dropped += len(self._frames) == self._frames.maxlen
                 self._frames.append(frame)
+            if self._frames:
+                self._filled.set()
+
+    def wait(self, seconds: float) -> bool:
+        """Sleep until a frame is there, at most so long; whether one is."""
+        return self._filled.wait(seconds)
 
     def take(self) -> list[SkeletonFrame]:
         """Every frame since the last call, oldest first."""
         with self._lock:
             frames = list(self._frames)
             self._frames.clear()
+            self._filled.clear()
         return frames

@@ -106,6 +106,10 @@ class LiveStream:
         """
         self._listeners = (*self._listeners, listener)
 
+    def wait(self, seconds: float) -> bool:
+        """Sleep until a frame is there, at most so long; whether one is."""
+        return self._inbox.wait(seconds)
+
     def poll(self) -> Sequence[SkeletonFrame]:
         """Every frame that has come since the last poll, oldest first; never blocks."""
         return [] if self._closed else self._inbox.take()

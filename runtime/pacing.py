@@ -1,0 +1,70 @@
+"""When the loop's next tick comes: at a steady rate, or as soon as there is a frame to perform."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import Protocol, runtime_checkable
+
+from devices.stream import SkeletonStream
+from runtime.clock import Ticker
+
+TICKS = 60.0  # a second, where nothing else sets the pace
+LULL = 0.04  # [s] without a frame, more than between those of a camera; only then tick without one
+MOST_TICKS = 240.0  # a second; what comes faster, from several performers, is taken together
+
+
+class Pace(Protocol):
+    """Waits between ticks."""
+
+    def wait(self) -> None:
+        """Return when the next tick should begin."""
+        ...
+
+
+@runtime_checkable
+class Waking(Protocol):
+    """A stream that can be waited for."""
+
+    def wait(self, seconds: float) -> bool:
+        """Sleep until a frame is there, at most so long; whether one is."""
+        ...
+
+
+class OnArrival:
+    """A tick as soon as a frame is there, so that none waits for a tick, at most `MOST_TICKS` a
+    second; once none has come for `LULL` seconds also without one, `TICKS` a second, for whoever
+    looks. A tick without a frame just before one comes would only hold it up.
+
+    Args:
+        stream: whose frames they are.
+        clock: host monotonic time [s].
+        sleep: waits for so many seconds.
+    """
+
+    def __init__(
+        self,
+        stream: Waking,
+        *,
+        clock: Callable[[], float] = time.monotonic,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._stream = stream
+        self._clock = clock
+        self._sleep = sleep
+        self._began = clock()
+        self._flowing = False
+
+    def wait(self) -> None:
+        """Sleep until a frame is there or the next tick is due without one."""
+        early = self._began + 1.0 / MOST_TICKS - self._clock()
+        if early > 0.0:
+            self._sleep(early)
+        patience = LULL if self._flowing else 1.0 / TICKS
+        self._flowing = self._stream.wait(max(self._began + patience - self._clock(), 0.0))
+        self._began = self._clock()
+
+
+def pace_of(stream: SkeletonStream) -> Pace:
+    """On arrival where the stream can be waited for, else `TICKS` a second."""
+    return OnArrival(stream) if isinstance(stream, Waking) else Ticker(TICKS)

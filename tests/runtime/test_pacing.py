@@ -1,0 +1,88 @@
+"""When ticks come, by a clock that the test holds."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from devices.inbox import Inbox
+from devices.simulator import Simulator
+from devices.skeleton import SkeletonFrame
+from devices.stream import open_stream
+from runtime.clock import Ticker
+from runtime.pacing import LULL, MOST_TICKS, TICKS, OnArrival, pace_of
+
+
+class Arrivals:
+    """A clock, and a stream on it whose frames come at known times."""
+
+    def __init__(self, *times: float) -> None:
+        self.now = 0.0
+        self._times = list(times)
+
+    def clock(self) -> float:
+        return self.now
+
+    def sleep(self, seconds: float) -> None:
+        self.now += seconds
+
+    def wait(self, seconds: float) -> bool:
+        due = [time for time in self._times if time <= self.now + seconds]
+        self.now = max(self.now, min(due, default=self.now + seconds))
+        return bool(due)
+
+    def poll(self) -> int:
+        came = [time for time in self._times if time <= self.now]
+        self._times = [time for time in self._times if time > self.now]
+        return len(came)
+
+
+def ticks(arrivals: Arrivals, count: int) -> list[tuple[float, int]]:
+    """When each tick began, and how many frames it found."""
+    pace = OnArrival(arrivals, clock=arrivals.clock, sleep=arrivals.sleep)
+    found = []
+    for _ in range(count):
+        pace.wait()
+        found.append((arrivals.now, arrivals.poll()))
+    return found
+
+
+def test_a_frame_is_performed_the_moment_it_comes() -> None:
+    came = [0.0131, 0.0297, 0.0464, 0.0633]
+    assert ticks(Arrivals(*came), 4) == [(pytest.approx(time), 1) for time in came]
+
+
+def test_whoever_looks_is_served_when_nothing_comes() -> None:
+    found = ticks(Arrivals(), 5)
+    np.testing.assert_allclose([time for time, _ in found], np.arange(1, 6) / TICKS)
+    found = ticks(Arrivals(0.01, 0.1), 6)
+    lull = 0.01 + LULL + np.arange(4) / TICKS
+    np.testing.assert_allclose([time for time, _ in found], [0.01, *lull, 0.1])
+    assert [frames for _, frames in found] == [1, 0, 0, 0, 0, 1]
+
+
+def test_a_burst_is_taken_together_and_a_flood_in_steps() -> None:
+    first, second, third = ticks(Arrivals(0.010, 0.0101, 0.0102, 0.0103), 3)
+    assert first == (0.010, 1)
+    assert second == (pytest.approx(0.010 + 1.0 / MOST_TICKS), 3)
+    assert third[1] == 0
+    flood = ticks(Arrivals(*np.arange(0.0, 0.1, 1e-4)), 20)
+    np.testing.assert_allclose(np.diff([time for time, _ in flood]), 1.0 / MOST_TICKS)
+
+
+def test_what_can_be_waited_for_is_waited_for() -> None:
+    with open_stream("vmc://127.0.0.1:0") as live, open_stream("sim://walk") as simulated:
+        assert isinstance(pace_of(live), OnArrival)
+        assert isinstance(simulated, Simulator)
+        assert isinstance(pace_of(simulated), Ticker)
+
+
+def test_an_inbox_can_be_waited_for() -> None:
+    inbox = Inbox(2)
+    frame = SkeletonFrame(0.0, np.zeros((1, 3)), None, np.ones(1))
+    inbox.put([])
+    assert not inbox.wait(0.0)
+    inbox.put([frame, frame, frame])
+    assert inbox.wait(0.0)
+    assert len(inbox.take()) == 2
+    assert not inbox.wait(0.0)
