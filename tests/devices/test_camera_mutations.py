@@ -1,6 +1,7 @@
 """Damaged packets of the cameras and hand sensors: no exception, no stall, no growing memory.
 
-MUTATED_PACKETS says how many of each decoder; 200000 takes some minutes.
+CI sends some thousands to each decoder; ``BUNRAKU_MUTATIONS=200000 pytest`` with this file sends as
+many as the project's promise names.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ from tests.devices.test_landmark_stream import SIZE, person, rows, seen_at
 from tests.devices.test_landmark_stream import message as landmarks
 from tests.devices.test_leap_live import HEADER, both, device_event
 
-COUNT = int(os.environ.get("MUTATED_PACKETS", "2000"))
+COUNT = int(os.environ.get("BUNRAKU_MUTATIONS", "2000"))
 TOKENS = [
     b"null",
     b"1e999",

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import re
 import socket
 import sys
 import threading
@@ -309,3 +310,51 @@ def test_a_webcam_without_the_extra_is_one_clear_line(monkeypatch: pytest.Monkey
     monkeypatch.setitem(sys.modules, "cv2", None)
     with pytest.raises(InputError, match=r"pip install 'bunraku\[mediapipe\]'"):
         Webcam(Path("no.task"), 0)
+
+
+class _Camera:
+    """A camera of OpenCV's that gives three pictures."""
+
+    def __init__(self, _number: int) -> None:
+        self._left = 3
+
+    def read(self) -> tuple[bool, np.ndarray]:
+        self._left -= 1
+        return self._left >= 0, np.zeros((480, 640, 3), np.uint8)
+
+
+class _Anything(SimpleNamespace):
+    """Stands for whatever of MediaPipe is named, called or not, on the way to a landmarker."""
+
+    def __getattr__(self, _name: str) -> Any:
+        return _Anything()
+
+    def __call__(self, *_: Any, **__: Any) -> Any:
+        return _Anything()
+
+    def detect_for_video(self, _image: Any, _milliseconds: int) -> SimpleNamespace:
+        body = [point(*map(float, p), 0.8) for p in person()]
+        return SimpleNamespace(pose_world_landmarks=[body], pose_landmarks=[body])
+
+
+def test_the_documented_sender_sends_what_is_understood(monkeypatch: pytest.MonkeyPatch) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "devices-cameras.md").read_text(encoding="utf-8")
+    (script,) = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    cv2 = SimpleNamespace(
+        VideoCapture=_Camera, cvtColor=lambda picture, _: picture, COLOR_BGR2RGB=4
+    )
+    monkeypatch.setitem(sys.modules, "cv2", cv2)
+    monkeypatch.setitem(sys.modules, "mediapipe", _Anything())
+    with open_stream("mediapipe://127.0.0.1:0") as stream:
+        assert script.count("7005") == 1
+        port = stream.transport.port  # type: ignore[attr-defined]
+        names: dict[str, Any] = {}
+        exec(script.replace("7005", str(port)), names)
+        names["sender"].close()
+        frames: list[SkeletonFrame] = []
+        end, pause = time.monotonic() + PATIENCE, threading.Event()
+        while len(frames) < 3 and time.monotonic() < end:
+            pause.wait(0.002)
+            frames += stream.poll()
+        assert len(frames) == 3
+        assert stream.traffic.refused == 0  # type: ignore[attr-defined]
