@@ -64,11 +64,14 @@ _POINTS_TO: dict[str, tuple[str, ...]] = {
         )
     },
 }
-# From which bone to which a bone is broad.
-_BREADTH = {
-    "Hips": ("RightUpperLeg", "LeftUpperLeg"),
-    **dict.fromkeys(_TRUNK, ("RightUpperArm", "LeftUpperArm")),
-    **{f"{side}Hand": (f"{side}LittleProximal", f"{side}IndexProximal") for side in SIDES},
+# Everybody stands in the same way at rest, but trunks and feet are jointed in different places;
+# arms may be held in any way. So these point along the performer's own rest, others a T-pose's.
+_STANDING = ("Hips", *_TRUNK, "Neck", "LeftFoot", "RightFoot")
+# From which bone to which a bone is broad; where one of them is missing, the next pair.
+_SHOULDERS = (("RightShoulder", "LeftShoulder"), ("RightUpperArm", "LeftUpperArm"))
+_BREADTHS: dict[str, tuple[tuple[str, str], ...]] = {
+    "Hips": (("RightUpperLeg", "LeftUpperLeg"),),
+    **{f"{side}Hand": ((f"{side}LittleProximal", f"{side}IndexProximal"),) for side in SIDES},
 }
 
 
@@ -137,9 +140,9 @@ class _Bone:
     Attributes:
         parent: the bone above, -1 for the world.
         end: the bone that it points to, or None to turn with its parent.
-        at_rest: the unit vector that it points along in a T-pose.
+        at_rest: the unit vector that it points along while the model stands in its T-pose.
         breadth: from which bone to which it is broad, or None.
-        broad_at_rest: the unit vector of its breadth in a T-pose.
+        broad_at_rest: the unit vector of its breadth in a T-pose, empty without one.
     """
 
     parent: int
@@ -167,8 +170,7 @@ class HumanoidBones:
         found = humanoid_bones(skeleton)
         self.names = tuple(found)
         self.joints = np.array(list(found.values()))
-        number = {name: bone for bone, name in enumerate(self.names)}
-        self._bones = [_bone(name, number) for name in self.names]
+        self._bones = [_bone(name, found, skeleton.rest_positions) for name in self.names]
         self._parents = np.array([bone.parent for bone in self._bones])
 
     def local(self, positions: Array) -> tuple[Array, Array]:
@@ -200,33 +202,45 @@ class HumanoidBones:
         return turns
 
 
-def _bone(name: str, number: Mapping[str, int]) -> _Bone:
+def _bone(name: str, found: Mapping[str, int], rest: Array) -> _Bone:
+    """How the turn of one bone is found among those in `found`, of a skeleton with this rest."""
     human = humanoid_skeleton()
+    number = {bone: place for place, bone in enumerate(found)}
 
-    def rest(bone: str) -> Array:
+    def in_t_pose(bone: str) -> Array:
         position: Array = human.rest_positions[human.index(bone)]
         return position
 
     def unit(vector: Array) -> Vector:
-        unit_vector: list[float] = (vector / np.linalg.norm(vector)).tolist()
+        length = np.linalg.norm(vector)
+        unit_vector: list[float] = (vector / length).tolist() if length > 0.0 else [0.0] * 3
         return unit_vector
 
     above = int(human.parents[human.index(name)])
     while above >= 0 and human.names[above] not in number:
         above = int(human.parents[above])
     end = next((end for end in _POINTS_TO.get(name, ()) if end in number), None)
-    # The trunk of a T-pose is upright; its joints lie a little before and behind each other.
-    upright = name in ("Hips", *_TRUNK, "Neck")
-    at_rest = (0.0, 1.0, 0.0) if upright or end is None else unit(rest(end) - rest(name))
-    breadth = _BREADTH.get(name)
-    there = breadth is not None and end is not None and set(breadth) <= number.keys()
+    way = np.zeros(3)
+    if end is not None and name in _STANDING:
+        way = rest[found[end]] - rest[found[name]]
+    elif end is not None:
+        way = in_t_pose(end) - in_t_pose(name)
+    pairs = _BREADTHS.get(name, _SHOULDERS if name == _top_of_trunk(found) else ())
+    breadth = next((pair for pair in pairs if set(pair) <= number.keys() and end), None)
     return _Bone(
         parent=number[human.names[above]] if above >= 0 else -1,
         end=None if end is None else number[end],
-        at_rest=at_rest,
-        breadth=(number[breadth[0]], number[breadth[1]]) if breadth and there else None,
-        broad_at_rest=unit(rest(breadth[1]) - rest(breadth[0])) if breadth else (1.0, 0.0, 0.0),
+        at_rest=unit(way),
+        breadth=None if breadth is None else (number[breadth[0]], number[breadth[1]]),
+        broad_at_rest=()
+        if breadth is None
+        else unit(in_t_pose(breadth[1]) - in_t_pose(breadth[0])),
     )
+
+
+def _top_of_trunk(found: Mapping[str, int]) -> str | None:
+    """The bone that carries the shoulders."""
+    return next((bone for bone in reversed(_TRUNK) if bone in found), None)
 
 
 # Vectors and quaternions as plain numbers: some fifty bones, each after its parent, where an array
