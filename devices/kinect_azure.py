@@ -233,18 +233,17 @@ class KinectAzure:
             readings.append(list(sample.acceleration))
         self._k4a.k4a_device_stop_imu(self._device)
         mean = np.mean(readings, axis=0) if readings else np.zeros(3)
-        ends = [self._from_accelerometer(point) for point in (np.zeros(3), mean)]
-        if abs(np.linalg.norm(mean) - _GRAVITY) > _AT_REST or None in ends:
+        foot, head = (self._from_accelerometer(point) for point in (np.zeros(3), mean))
+        if abs(np.linalg.norm(mean) - _GRAVITY) > _AT_REST or foot is None or head is None:
             return np.zeros(3)
-        up: NDArray[np.float64] = np.subtract(ends[1], ends[0]) / _GRAVITY
-        return up
+        return (head - foot) / _GRAVITY
 
-    def _from_accelerometer(self, point: NDArray[np.float64]) -> list[float] | None:
+    def _from_accelerometer(self, point: NDArray[np.float64]) -> NDArray[np.float64] | None:
         source, target = (ctypes.c_float * 3)(*point), (ctypes.c_float * 3)()
         failed = self._k4a.k4a_calibration_3d_to_3d(
             self._calibration, source, _ACCELERATION, _DEPTH, target
         )
-        return None if failed else list(target)
+        return None if failed else np.array(target, dtype=np.float64)
 
     def _capture(self) -> None:
         """Take every capture as it comes, on a thread of its own; the newest waits."""

@@ -101,7 +101,8 @@ def rotations(bases: Array) -> tuple[Array, NDArray[np.bool_]]:
     is turned round. The second result (n,) says which are bases at all."""
     with np.errstate(over="ignore", invalid="ignore"):
         gram = np.swapaxes(bases, 1, 2) @ bases
-        known: NDArray[np.bool_] = (np.abs(gram - np.eye(3)) < _SQUARE).all(axis=(1, 2))
+        close = np.abs(gram - np.eye(3)) < _SQUARE
+    known: NDArray[np.bool_] = np.logical_and.reduce(close, axis=(1, 2))
     turned = bases.copy()
     turned[known & (np.linalg.det(np.where(known[:, None, None], bases, 0.0)) < 0.0), :, 0] *= -1.0
     return turned, known
