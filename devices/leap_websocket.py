@@ -14,7 +14,7 @@ import json
 import threading
 import time
 from collections.abc import Callable, Iterator
-from typing import TYPE_CHECKING
+from typing import Any
 from urllib.parse import SplitResult
 
 from devices.address import host_and_port, one_of, options_of
@@ -22,9 +22,6 @@ from devices.errors import InputError
 from devices.leap_messages import MOST_BYTES, LeapDecoder
 from devices.leap_performer import BOTH
 from devices.live_stream import Deliver, LiveStream
-
-if TYPE_CHECKING:
-    from websockets.sync.client import ClientConnection
 
 PORT = 6437
 NEWEST = 6
@@ -104,7 +101,7 @@ class LeapWebSocket:
                 "UltraleapTrackingWebSocket beside it if it is newer than Orion?"
             )
 
-    def _messages(self, connection: ClientConnection) -> Iterator[bytes]:
+    def _messages(self, connection: Any) -> Iterator[bytes]:
         while not self._closing.is_set():
             try:
                 message = connection.recv(timeout=LOOK)
@@ -112,7 +109,7 @@ class LeapWebSocket:
                 continue
             yield message.encode() if isinstance(message, str) else message
 
-    def _ask(self, connection: ClientConnection) -> None:
+    def _ask(self, connection: Any) -> None:
         self._connection_trouble = ""
         for setting in SETTINGS:
             connection.send(json.dumps(setting))

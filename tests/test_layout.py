@@ -30,13 +30,16 @@ MAY_LOAD = {
 GRAPHICS = {"moderngl", "glfw"}
 EXTRAS = {
     "av",
+    "cv2",
     "fast_simplification",
     "igl",
     "imgui_bundle",
     "manifold3d",
+    "mediapipe",
     "meshio",
     "pxr",
     "pygel3d",
+    "websockets",
 }
 
 
