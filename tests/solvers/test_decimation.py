@@ -8,6 +8,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import Delaunay
 
 from solvers.decimation import Decimation, decimate
 
@@ -120,6 +121,33 @@ def test_close_plates_never_meet_and_no_piece_is_lost():
     assert (before[found.kept][found.cluster] == before).all()
 
 
+def test_a_thin_ring_is_not_cut():
+    """Its cross-section has three vertices: a shorter edge than those would cut it through."""
+    vertices, faces = torus(100, 3)
+    vertices[:, 1] *= 0.1
+    found = decimate(vertices, faces, 30)
+    edges, uses = edge_uses(found.faces)
+    assert (uses == 2).all()
+    assert len(found.kept) - len(edges) + len(found.faces) == 0
+    corners = np.sort(found.faces, axis=1)
+    assert len(np.unique(corners, axis=0)) == len(corners)
+
+
+def test_no_face_of_a_flat_sheet_turns_over():
+    points = np.random.default_rng(0).random((3_000, 2)) ** 2  # far denser in one corner
+    faces = Delaunay(points).simplices.astype(np.int64)
+    vertices = np.column_stack([points, np.zeros(len(points))])
+
+    def areas(of: Ints) -> Floats:
+        a, b, c = (vertices[of[:, corner], :2] for corner in range(3))
+        u, v = b - a, c - a
+        return u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
+
+    faces = np.where(areas(faces)[:, None] > 0.0, faces, faces[:, ::-1])
+    found = decimate(vertices, faces, 200)
+    assert (areas(found.kept[found.faces]) > 0.0).all()
+
+
 def test_what_cannot_be_simplified_is_left():
     rng = np.random.default_rng(0)
     soup = rng.normal(size=(300, 3))
@@ -142,6 +170,7 @@ def test_broken_surfaces_stay_whole():
     assert len(found.kept) <= 420
     _, uses = edge_uses(found.faces)
     assert (uses == 3).sum() == 29  # the seam is kept as it is
+    assert np.isin(seam, found.kept).all()
     used = np.unique(merge[wings])
     assert (found.cluster[used] >= 0).all()
     assert found.cluster[-1] == -1
