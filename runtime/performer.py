@@ -44,6 +44,7 @@ class Pose:
         mirrored: whether left is right.
         scaled: whether lengths were made those of the skeleton's rest pose.
         scale: what they were multiplied by.
+        time: [s] when; nan where it does not matter.
     """
 
     seen: Array
@@ -56,6 +57,7 @@ class Pose:
     mirrored: bool = False
     scaled: bool = False
     scale: float = 1.0
+    time: float = float("nan")
 
     def facing(self, heading: float) -> Array:
         """Every joint (J, 3) [m], the whole body turned so that it has this heading [rad]."""
@@ -140,6 +142,7 @@ class Performer:
             mirrored=whole.mirrored,
             scaled=whole.scaled,
             scale=whole.scale,
+            time=frame.time,
         )
         return self.pose
 

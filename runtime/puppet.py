@@ -11,9 +11,10 @@ from scipy.spatial.transform import Rotation
 
 from devices.errors import InputError
 from runtime.character import Character
+from runtime.exaggeration import Exaggeration, Strain
 from runtime.mapping import Drive, Mapping
 from runtime.performer import Pose, Rest
-from runtime.skin import Skin
+from runtime.skin import Anchors, Skin
 from solvers.abstraction import abstract
 from solvers.heading import turn_about, turned
 from solvers.polyline_motion import ChainRetarget
@@ -142,7 +143,8 @@ class Puppet:
     def _drive(self, chains: tuple[tuple[int, ...], ...], root: int) -> None:
         """Hold on to `root` and move the chains."""
         self._skeleton_pose = SkeletonPose(self.tree, root, chains)
-        self._parents = self.tree.rerooted(root).parents
+        oriented = self.tree.rerooted(root)
+        self._parents, self._order = oriented.parents, oriented.order
         self._driven = np.array([node for chain in chains for node in chain[1:]], dtype=np.int64)
         self._chains = chains
         node, pivot = self.binding.node, self.binding.pivot
@@ -150,6 +152,9 @@ class Puppet:
         self._bone = np.where(self._parents[pivot] == node, pivot, node)
         self._bone[node == pivot] = -1
         self._retargets = []
+        lengths = [_chain_length(self.tree.positions, chain) for chain in chains]
+        height = float(np.ptp(self.character.vertices[:, 1]))
+        self._exaggeration = Exaggeration(np.array(lengths), height)
 
     def rehearse(self, poses: Sequence[Pose]) -> Array:
         """Go through poses, holding back limbs whose surface cannot follow them.
@@ -177,7 +182,8 @@ class Puppet:
     def _try(self, pose: Pose) -> tuple[Array, Array]:
         """Corners (2, 3) [m] and relative stretch (E,) of the edges in one pose."""
         self.follow(pose)
-        deformed = self.skin.deform(*self._anchors(), REHEARSED_ITERATIONS)
+        still = Strain(np.ones(len(self._chains)), 1.0)
+        deformed = self.skin.deform(self._anchors(still), REHEARSED_ITERATIONS)
         seen = self._with_body(deformed).vertices
         box = np.array([seen.min(axis=0), seen.max(axis=0)])
         return box, self.skin.stretch(deformed)
@@ -199,7 +205,7 @@ class Puppet:
         for number, chain in enumerate(self._chains):
             bent[list(chain[1:]), number] = True
         moved = bent.copy()
-        for node in Tree(self._parents, self.tree.positions).order:
+        for node in self._order:
             if self._parents[node] >= 0:
                 moved[node] |= moved[self._parents[node]]
         bone = np.where(self._bone >= 0, self._bone, self.binding.node)
@@ -224,7 +230,7 @@ class Puppet:
         self._body = Body()
         self._source_rest = None
         self._pose_nodes([])
-        self._turn = self._lift = 0.0
+        self._turn = self._lift = self._time = 0.0
         self._shift = np.zeros(3)
 
     @property
@@ -246,9 +252,11 @@ class Puppet:
         )
         self._turn = pose.heading - rest.heading if self._body.turns else 0.0
         self._lift = self._body.lift * float(pose.hips[1] - rest.height)
+        self._time = pose.time
 
     def _pose_nodes(self, turns: list[Array]) -> None:
-        self._rotations, self._positions = self._skeleton_pose.pose(turns)
+        self._rotations, self._posed = self._skeleton_pose.pose(turns)
+        self._positions = self._posed
         bones = self._rotations[np.maximum(self._parents, 0)]
         if len(self._driven):
             bones[self._driven] = np.concatenate(turns)
@@ -256,16 +264,50 @@ class Puppet:
 
     def deform(self) -> Motion:
         """Let the surface follow the nodes, and the whole follow the performer's body."""
-        return self._with_body(self.skin.deform(*self._anchors(), self.iterations))
+        strain = self._strain()
+        self._positions = self._stretched(strain)
+        return self._with_body(self.skin.deform(self._anchors(strain), self.iterations))
 
-    def _anchors(self) -> tuple[Array, Array]:
-        """How the anchors have turned (A, 4), and the nodes (A, 3) that they turn about."""
+    def _strain(self) -> Strain:
+        """How far the character's own motion stretches it."""
+        amount = self.skin.elasticity.cartoon
+        starts, ends = [c[0] for c in self._chains], [c[-1] for c in self._chains]
+        tips = self._posed[ends] - self._posed[starts]
+        return self._exaggeration.strain(self._time, tips, self._lift, amount)
+
+    def _stretched(self, strain: Strain) -> Array:
+        """Where the nodes are (K, 3) [m] once limbs and the whole are stretched."""
+        if strain.is_none:
+            return self._posed
+        share = self._share_of_nodes(strain)
+        positions = self._posed.copy()
+        for node in self._order:
+            parent = self._parents[node]
+            if parent >= 0:
+                bone = self._posed[node] - self._posed[parent]
+                positions[node] = positions[parent] + share[node] * bone
+        return positions @ self._whole(strain).T
+
+    def _share_of_nodes(self, strain: Strain) -> Array:
+        """How long the bone that ends at each node is (K + 1,); the last is no node's."""
+        share = np.ones(len(self.tree) + 1)
+        for chain, length in zip(self._chains, strain.limbs, strict=True):
+            share[list(chain[1:])] = length
+        return share
+
+    def _whole(self, strain: Strain) -> Array:
+        thin = strain.body ** (-0.5 * self.skin.elasticity.volume_gain)
+        return np.diag([thin, strain.body, thin])
+
+    def _anchors(self, strain: Strain) -> Anchors:
+        """Where the bones take the anchors."""
         bones = np.where(
             (self._bone >= 0)[:, None],
             self._bones[self._bone],
             self._rotations[self.binding.node],
         )
-        return bones, self._positions[self.binding.pivot]
+        pivots = self._positions[self.binding.pivot]
+        return Anchors(bones, pivots, self._share_of_nodes(strain)[self._bone], self._whole(strain))
 
     def _with_body(self, deformed: Array) -> Motion:
         vertices = self.skin.cover(deformed)
@@ -315,12 +357,13 @@ def body_of(mapping: Mapping, legs: list[frozenset[int]], source: Array, target:
 def _length(drives: list[Drive], target: Array, source: Array) -> float:
     """How long the driven chains are for each metre of those that drive them."""
 
-    def total(points: Array, chain: tuple[int, ...]) -> float:
-        return float(np.linalg.norm(np.diff(points[list(chain)], axis=0), axis=1).sum())
-
-    ours = sum(total(target, drive.target) for drive in drives)
-    theirs = sum(total(source, drive.source) for drive in drives)
+    ours = sum(_chain_length(target, drive.target) for drive in drives)
+    theirs = sum(_chain_length(source, drive.source) for drive in drives)
     return ours / theirs if theirs > 0.0 else 0.0
+
+
+def _chain_length(points: Array, chain: tuple[int, ...]) -> float:
+    return float(np.linalg.norm(np.diff(points[list(chain)], axis=0), axis=1).sum())
 
 
 def scaled(rotations: Array, share: float) -> Array:

@@ -33,6 +33,23 @@ class Elasticity:
     volume_gain: float = 1.0
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class Anchors:
+    """Where the bones take the A anchors of a skin.
+
+    Attributes:
+        turns: (A, 4) how far each has turned from rest, quaternions (x, y, z, w).
+        pivots: (A, 3) [m] where the node is about which it turns.
+        lengths: (A,) how long its bone is, as a share of its length at rest.
+        whole: (3, 3) what is done to the whole character afterwards.
+    """
+
+    turns: Array
+    pivots: Array
+    lengths: Array
+    whole: Array
+
+
 class Skin:
     """Binds a character's surface to its bones once, and lets it follow them.
 
@@ -68,6 +85,9 @@ class Skin:
             proxy.vertices, proxy.faces, handles, groups=self._group, cartoon=0.0
         )
         self._offsets = self.rest[handles] - tree.positions[self.binding.pivot[self._group]]
+        bones = tree.positions[self.binding.node] - tree.positions[self.binding.pivot]
+        long = np.linalg.norm(bones, axis=1, keepdims=True)
+        self._axes = np.divide(bones, long, out=np.zeros_like(bones), where=long > 0.0)
         self._answer = np.empty_like(self.rest)
         self.elasticity = Elasticity()
 
@@ -91,19 +111,15 @@ class Skin:
         """Forget the last answer."""
         self._solver.reset()
 
-    def deform(self, turns: Array, pivots: Array, iterations: int) -> Array:
-        """Let the deformed surface follow its anchors.
-
-        Args:
-            turns: (A, 4) how far each anchor has turned from rest, quaternions (x, y, z, w).
-            pivots: (A, 3) [m] where the node is about which it turns.
-            iterations: of the solver.
-
-        Returns:
-            (C, 3) [m], overwritten by the next call.
-        """
-        turn = Rotation.from_quat(turns).as_matrix()[self._group]
-        targets = np.einsum("hij,hj->hi", turn, self._offsets) + pivots[self._group]
+    def deform(self, anchors: Anchors, iterations: int) -> Array:
+        """Let the deformed surface (C, 3) [m] follow its anchors; the next call overwrites it."""
+        turn = Rotation.from_quat(anchors.turns).as_matrix()
+        # Along its bone a ring goes as far out as the bone is longer; around it, it is thinner.
+        along = np.einsum("ai,aj->aij", self._axes, self._axes)
+        thin = anchors.lengths ** (-0.5 * self._elasticity.volume_gain)
+        strain = thin[:, None, None] * np.eye(3) + (anchors.lengths - thin)[:, None, None] * along
+        moved = np.einsum("aij,ajk->aik", anchors.whole @ turn, strain)[self._group]
+        targets = np.einsum("hij,hj->hi", moved, self._offsets) + anchors.pivots[self._group]
         return self._solver.solve(targets, iterations, out=self._answer)
 
     def cover(self, deformed: Array) -> Array:

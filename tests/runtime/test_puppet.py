@@ -14,6 +14,7 @@ from devices.errors import InputError
 from runtime.mapping import Drive, Mapping
 from runtime.performer import Performer, Pose, rest_state
 from runtime.puppet import Body, Motion, Puppet, body_of, scaled
+from runtime.skin import Elasticity
 from solvers.edges import unique_edges
 from solvers.heading import turned
 from tests.runtime.figures import (
@@ -332,3 +333,25 @@ def test_every_edge_counts_once_and_edges_without_length_never() -> None:
     faces = np.array([[0, 1, 2], [0, 2, 3], [3, 4, 0]])
     edges = {tuple(edge) for edge in unique_edges(vertices, faces).tolist()}
     assert edges == {(0, 1), (1, 2), (0, 2), (2, 3), (0, 3), (0, 4)}
+
+
+def test_a_cartoon_stretches_the_limbs_that_swing_and_rigid_ones_keep_their_length(
+    puppet: Puppet,
+) -> None:
+    def reach(cartoon: float) -> np.ndarray:
+        driven(puppet, ARMS)
+        puppet.skin.elasticity = Elasticity(cartoon=cartoon)
+        performer, lengths = Performer(BODY), []
+        for number, positions in enumerate(waving(24)):
+            puppet.follow(performer.follow(frame(positions, number / 60.0)))
+            vertices = puppet.deform().vertices
+            assert np.isfinite(vertices).all()
+            bones = np.diff(puppet.chains[0], axis=0)
+            lengths.append((np.linalg.norm(bones, axis=1).sum(), np.ptp(vertices[:, 0])))
+        puppet.skin.elasticity = Elasticity()
+        return np.array(lengths)
+
+    rigid, cartoon = reach(0.0), reach(1.0)
+    np.testing.assert_allclose(rigid[:, 0], rigid[0, 0], rtol=1e-9)
+    assert cartoon[:, 0].max() > 1.1 * rigid[0, 0]
+    assert cartoon[:, 1].max() > rigid[:, 1].max() + 0.02, "the surface goes along"

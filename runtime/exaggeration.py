@@ -1,0 +1,83 @@
+"""What makes a character move like a cartoon: what goes fast stretches, what stops is squashed.
+
+Chenney et al. 2002, Simulating cartoon style animation, stretch a body by its speed and squash it
+where it is stopped. Here each driven limb grows longer with the speed of its tip, and the whole
+body with the speed at which it rises or falls; damped springs carry both on, so that a limb or a
+body that stops is squashed for a moment. The volume is the solver's: `solvers.squash_stretch`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.springs import Springs
+
+Array = NDArray[np.float64]
+
+FREQUENCY = 3.0  # [1/s] of the springs: about a step's
+DAMPING = 0.35  # one clear overshoot
+LIMB = 0.35  # by which share a limb grows at most
+BODY = 0.3
+FAST_LIMB = 6.0  # [1/s] limb lengths that a tip goes in a second, for most of that
+FAST_BODY = 1.2  # [1/s] body heights
+LONGEST_STEP = 0.1  # [s] between frames; after a longer one nothing is known of speeds
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Strain:
+    """How far a character is stretched by its motion.
+
+    Attributes:
+        limbs: (D,) the length of each driven chain, as a share of its own.
+        body: the height of the whole.
+    """
+
+    limbs: Array
+    body: float
+
+    @property
+    def is_none(self) -> bool:
+        """Whether nothing is stretched at all."""
+        return self.body == 1.0 and bool((self.limbs == 1.0).all())
+
+
+class Exaggeration:
+    """Follows how fast a character moves.
+
+    Args:
+        lengths: (D,) [m] of the driven chains.
+        height: [m] of the character.
+    """
+
+    def __init__(self, lengths: Array, height: float) -> None:
+        self._lengths = np.maximum(lengths, 1e-9)
+        self._height = max(height, 1e-9)
+        self._limbs = Springs(np.zeros(len(lengths)), frequency=FREQUENCY, damping=DAMPING)
+        self._body = Springs(0.0, frequency=FREQUENCY, damping=DAMPING)
+        self._before: tuple[float, Array, float] | None = None
+
+    def strain(self, time: float, tips: Array, lift: float, amount: float) -> Strain:
+        """How far the character is stretched at a moment.
+
+        Args:
+            time: [s].
+            tips: (D, 3) [m] from each chain's start to its tip.
+            lift: [m] how far the whole has risen.
+            amount: from 0, not at all, to 1.
+        """
+        passed = math.inf if self._before is None else time - self._before[0]
+        limbs, body = np.zeros(len(self._lengths)), 0.0
+        if self._before is not None and 0.0 < passed <= LONGEST_STEP:
+            _, tips_before, lift_before = self._before
+            speeds = np.linalg.norm(tips - tips_before, axis=1) / self._lengths / passed
+            limbs = LIMB * np.tanh((speeds / FAST_LIMB) ** 2)
+            body = BODY * math.tanh(abs(lift - lift_before) / self._height / passed / FAST_BODY)
+        self._before = (time, tips.copy(), lift)
+        if 0.0 < passed < math.inf:
+            self._limbs.step(limbs, passed)
+            self._body.step(body, passed)
+        return Strain(1.0 + amount * self._limbs.at, 1.0 + amount * float(self._body.at))
