@@ -1,13 +1,15 @@
 """As-rigid-as-possible deformation, warm-started and prefactored, for every frame of a performance.
 
 Sorkine and Alexa 2007, As-rigid-as-possible surface modeling; Chao et al. 2010, A simple geometric
-model for elastic deformations, for the energy with rims. Three things are added.
+model for elastic deformations, for the energy with rims. Four things are added.
 
 - The start. The last answer first moves along with the handles (`solvers.handle_motion`), so that a
   rigid motion of all handles is the answer at once. After a jump the rest pose, moved along, is
   taken instead if it is nearer to rigid: a bad frame leaves nothing behind.
 - The unknown. The global step solves for the correction of the positions, from a residual in double
   precision, so the error of the solve is relative to the correction, not to the character.
+- Rotations that know of each other, where asked for: smooth ones for few handles, and limbs that
+  stay stiff (`solvers.rotation_priors`).
 - The parts that no handle touches. A component without a handle is nobody's to bend: it is carried
   rigidly by the nearest group of handles, and so is a vertex without a face.
 """
@@ -21,14 +23,24 @@ from numpy.typing import ArrayLike
 
 from solvers.arap_cells import SPOKES, SPOKES_AND_RIMS, build_cells
 from solvers.arap_kernels import energy_terms, fit_cells, place_outside, pull_soft, residual
-from solvers.arap_layout import Frame, checked_mesh, checked_targets, lay_out
+from solvers.arap_layout import Frame, checked_integers, checked_mesh, checked_targets, lay_out
 from solvers.compiled import most_threads, threads_for
 from solvers.following import Following
 from solvers.handle_motion import farthest_motion, fit_motions, follow, follow_one_group
 from solvers.handles import checked_handles, nearest_groups, unheld
 from solvers.held_system import HeldSystem, Hold
-from solvers.laplacian import Floats
+from solvers.laplacian import Floats, Ints
 from solvers.rotation_fit import SCRATCH
+from solvers.rotation_priors import (
+    NO_PRIORS,
+    SMOOTHNESS,
+    RotationPriors,
+    fit_cells_near,
+    turn_along,
+)
+
+SMOOTH_ROTATIONS = "smooth-rotations"
+ENERGIES = (SPOKES, SPOKES_AND_RIMS, SMOOTH_ROTATIONS)
 
 # A group that turned or went further than this between two frames has jumped: radians, and shares
 # of the character's size.
@@ -47,7 +59,8 @@ class ArapSolver:
         faces: triangles (F, 3); boundaries, non-manifold edges, zero-area faces, vertices without
             faces and several components are all fine.
         handles: vertex indices (H,), at least one, each once.
-        energy: "spokes" (Sorkine and Alexa 2007) or "spokes-and-rims" (Chao et al. 2010).
+        energy: "spokes" (Sorkine and Alexa 2007), "spokes-and-rims" (Chao et al. 2010), or
+            "smooth-rotations" (Levi and Gotsman 2015), which bends evenly between few handles.
         groups: which handles move rigidly together, any integers (H,); all of them by default.
         weights: how firmly each handle is held (H,); see `hold`.
 
@@ -67,8 +80,8 @@ class ArapSolver:
         weights: ArrayLike | None = None,
     ) -> None:
         points, triangles = checked_mesh(vertices, faces)
-        if energy not in (SPOKES, SPOKES_AND_RIMS):
-            raise ValueError(f"unknown energy {energy!r}: use {SPOKES!r} or {SPOKES_AND_RIMS!r}")
+        if energy not in ENERGIES:
+            raise ValueError(f"unknown energy {energy!r}: use one of {', '.join(ENERGIES)}")
         self._frame = Frame.around(points)
         self._layout = layout = lay_out(points, triangles)
         self._handles = checked_handles(handles, groups, weights, layout)
@@ -79,7 +92,11 @@ class ArapSolver:
         self._system = HeldSystem(self._mesh.laplacian, layout.tree, self._held())
         self._following = Following(self._system, self._handles)
         count = len(points)
-        self._R = np.empty((count, 9))
+        smoothing = SMOOTHNESS * _area(self._rest, layout.faces)
+        self._priors = RotationPriors(
+            self._mesh, self._rest, smoothing if energy == SMOOTH_ROTATIONS else 0.0
+        )
+        self._R = np.tile(np.eye(3).ravel(), (count, 1))
         self._laplace_x = np.empty((count, 3))
         self._residual = np.empty((count, 3))
         self._room = np.empty((most_threads(), SCRATCH))
@@ -125,9 +142,43 @@ class ArapSolver:
         self._system.hold(self._held())
         self._following.reweigh(self._handles)
 
+    def stiffen(self, region_of: ArrayLike, rigidity: ArrayLike) -> None:
+        """Name the parts of the surface that `stiffness` keeps from bending.
+
+        Args:
+            region_of: (N,) integers, which part each vertex belongs to.
+            rigidity: (N,) in [0, 1], how much of the stiffness each takes: 1 within a limb, falling
+                to 0 where it may bend; see `solvers.articulation`.
+
+        Raises:
+            ValueError: for wrong shapes or a rigidity out of range; nothing changes then.
+        """
+        count = len(self._x)
+        regions = checked_integers(region_of, "regions")
+        shares = np.asarray(rigidity, dtype=np.float64)
+        for name, values in (("regions", regions), ("rigidity", shares)):
+            if values.shape != (count,):
+                raise ValueError(f"expected {name} of shape ({count},), got {values.shape}")
+        if not ((shares >= 0.0) & (shares <= 1.0)).all():
+            raise ValueError("expected a rigidity in [0, 1] at every vertex")
+        order = self._layout.order
+        self._priors.stiffen(regions[order], shares[order])
+
+    @property
+    def stiffness(self) -> float:
+        """How stiff the parts named by `stiffen` are, in [0, 1); 0 costs nothing."""
+        return self._priors.stiffness
+
+    @stiffness.setter
+    def stiffness(self, share: float) -> None:
+        if not 0.0 <= share < 1.0:
+            raise ValueError(f"expected a stiffness in [0, 1), got {share}")
+        self._priors.stiffness = float(share)
+
     def reset(self) -> None:
         """Forget the last answer: the next solve starts from the rest pose."""
         self._x[:] = self._rest
+        self._R[:] = np.eye(3).ravel()
         self._goals = self._x[self._handles.places]
 
     def solve(
@@ -161,14 +212,29 @@ class ArapSolver:
     @property
     def energy(self) -> float:
         """The energy of the last answer under its best rotations, in the vertices' unit squared."""
-        return self._energy_of(self._x) * self._frame.size**2
+        rotations = self._R.copy()
+        self._local_step(self._x)
+        energy = self._sum_terms(self._x) + self._priors.energy(self._R)
+        self._R[:] = rotations
+        return energy * self._frame.size**2
 
     def rotations(self) -> Floats:
         """How each vertex's cell was turned by the last iteration, (N, 3, 3)."""
         return self._R[self._layout.place].reshape(-1, 3, 3)
 
     def _local_step(self, x: Floats) -> None:
-        fit_cells(x, self._mesh.cells, self._R, self._laplace_x, self._room)
+        priors = self._priors.find(self._R)
+        self._fit(x, priors)
+        if len(priors):
+            self._priors.turn_regions(priors, self._R)
+
+    def _fit(self, x: Floats, priors: Floats) -> None:
+        """Fit the cells to x, near priors (N, 9), which become the covariances, or none (0, 9)."""
+        cells = self._mesh.cells
+        if len(priors):
+            fit_cells_near(x, cells, priors, self._R, self._laplace_x, self._room)
+        else:
+            fit_cells(x, cells, self._R, self._laplace_x, self._room)
 
     def _global_step(self) -> None:
         held, places = self._system.held, self._handles.places
@@ -187,6 +253,8 @@ class ArapSolver:
         step = following.motions(self._goals, goals)
         angle, path = farthest_motion(step, self._goals, following.known)
         follow(self._x, following.influences, step, self._x)
+        if self._priors.is_on:
+            turn_along(self._R, following.influences, step)
         self._goals = goals
         self._put_held(goals, self._x)
         if angle > _JUMP_ANGLE or path > _JUMP_PATH:
@@ -195,6 +263,8 @@ class ArapSolver:
             self._put_held(goals, self._from_rest)
             if self._energy_of(self._from_rest) < _BETTER * self._energy_of(self._x):
                 self._x[:] = self._from_rest
+                if self._priors.is_on:
+                    self._fit(self._x, NO_PRIORS)
 
     def _put_held(self, goals: Floats, x: Floats) -> None:
         """Put what is not free into x: hard handles at their goals, carried parts beside theirs."""
@@ -208,7 +278,11 @@ class ArapSolver:
             x[self._carried] = moved
 
     def _energy_of(self, x: Floats) -> float:
-        self._local_step(x)
+        """The energy of x alone, whatever else its rotations are asked for."""
+        self._fit(x, NO_PRIORS)
+        return self._sum_terms(x)
+
+    def _sum_terms(self, x: Floats) -> float:
         energy_terms(x, self._R, self._rest, self._mesh.terms, self._energy_terms)
         return float(self._energy_terms.sum())
 
@@ -229,6 +303,11 @@ class ArapSolver:
         return Hold(fixed, stiffness)
 
 
+def _area(points: Floats, faces: Ints) -> float:
+    a, b, c = (points[faces[:, corner]] for corner in range(3))
+    return 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+
+
 def warm() -> None:
     """Compile what a performance will call, so that no frame waits for it; it is cached on disk.
 
@@ -239,3 +318,7 @@ def warm() -> None:
     faces = np.concatenate([np.stack([a, a + 1, a + 10], 1), np.stack([a, a + 10, a + 9], 1)])
     solver = ArapSolver(grid, faces, [0, 8, 72, 80])
     solver.solve(grid[[0, 8, 72, 80]][::-1], 1)  # a jump, which compiles the energy too
+    solver = ArapSolver(grid, faces, [0, 8, 72, 80], energy=SMOOTH_ROTATIONS)
+    solver.stiffen(np.zeros(81, dtype=np.int64), np.ones(81))
+    solver.stiffness = 0.5
+    solver.solve(grid[[0, 8, 72, 80]], 1)

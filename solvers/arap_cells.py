@@ -66,11 +66,15 @@ class Cells(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class CellMesh:
-    """All that a deformation needs to know of a mesh at rest; `laplacian` is (N, N)."""
+    """All that a deformation needs to know of a mesh at rest.
+
+    `laplacian` is (N, N); `sharing` is the number of cells that an edge lies in.
+    """
 
     cells: Cells
     terms: Terms
     laplacian: sp.csr_matrix
+    sharing: int
 
 
 def build_cells(vertices: Floats, faces: Ints, energy: str) -> CellMesh:
@@ -128,4 +132,4 @@ def _lay_out(vertices: Floats, edges: WeightedEdges, terms: Terms, *, sharing: i
         pulls=np.ascontiguousarray(u[twins]),
         own=own,
     )
-    return CellMesh(half_edges, terms, graph_laplacian(edges, count))
+    return CellMesh(half_edges, terms, graph_laplacian(edges, count), sharing)

@@ -19,45 +19,56 @@ from solvers.rotation_fit import LANES, fit_rotations
 _R = 9 * LANES
 
 
+@kernel
+def covariances(  # noqa: PLR0917
+    x: Floats, cells: Cells, first: int, size: int, lanes: Floats, laplace_x: Floats
+) -> None:
+    """The covariances S of `size` cells into rows 0 to 8 of `lanes`; L x into laplace_x.
+
+    Source: Sorkine and Alexa 2007, eq. (5).
+    """
+    starts, neighbours, fits = cells.starts, cells.neighbours, cells.fits
+    for k in range(size):
+        i = np.uint64(first + k)
+        x0, x1, x2 = x[i, 0], x[i, 1], x[i, 2]
+        s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = s8 = 0.0
+        l0 = l1 = l2 = 0.0
+        for h in range(np.uint64(starts[i]), np.uint64(starts[i + np.uint64(1)])):
+            j = np.uint64(neighbours[h])
+            d0, d1, d2 = x[j, 0] - x0, x[j, 1] - x1, x[j, 2] - x2
+            u0, u1, u2, w = fits[h, 0], fits[h, 1], fits[h, 2], fits[h, 3]
+            s0 += d0 * u0
+            s1 += d0 * u1
+            s2 += d0 * u2
+            s3 += d1 * u0
+            s4 += d1 * u1
+            s5 += d1 * u2
+            s6 += d2 * u0
+            s7 += d2 * u1
+            s8 += d2 * u2
+            l0 -= w * d0
+            l1 -= w * d1
+            l2 -= w * d2
+        lanes[k], lanes[LANES + k], lanes[2 * LANES + k] = s0, s1, s2
+        lanes[3 * LANES + k], lanes[4 * LANES + k], lanes[5 * LANES + k] = s3, s4, s5
+        lanes[6 * LANES + k], lanes[7 * LANES + k], lanes[8 * LANES + k] = s6, s7, s8
+        laplace_x[i, 0], laplace_x[i, 1], laplace_x[i, 2] = l0, l1, l2
+
+
 @parallel_kernel
 def fit_cells(x: Floats, cells: Cells, R: Floats, laplace_x: Floats, room: Floats) -> None:
     """The local step: each cell's best rotation into R; L x into laplace_x on the way.
 
     `room` (threads, SCRATCH) is what each thread works in.
 
-    Source: Sorkine and Alexa 2007, eqs. (5) and (6).
+    Source: Sorkine and Alexa 2007, eq. (6).
     """
-    starts, neighbours, fits = cells.starts, cells.neighbours, cells.fits
-    count = len(starts) - 1
+    count = len(cells.starts) - 1
     for block in prange((count + LANES - 1) // LANES):
         lanes = room[get_thread_id()]
         first = block * LANES
         size = min(LANES, count - first)
-        for k in range(size):
-            i = np.uint64(first + k)
-            x0, x1, x2 = x[i, 0], x[i, 1], x[i, 2]
-            s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = s8 = 0.0
-            l0 = l1 = l2 = 0.0
-            for h in range(np.uint64(starts[i]), np.uint64(starts[i + np.uint64(1)])):
-                j = np.uint64(neighbours[h])
-                d0, d1, d2 = x[j, 0] - x0, x[j, 1] - x1, x[j, 2] - x2
-                u0, u1, u2, w = fits[h, 0], fits[h, 1], fits[h, 2], fits[h, 3]
-                s0 += d0 * u0
-                s1 += d0 * u1
-                s2 += d0 * u2
-                s3 += d1 * u0
-                s4 += d1 * u1
-                s5 += d1 * u2
-                s6 += d2 * u0
-                s7 += d2 * u1
-                s8 += d2 * u2
-                l0 -= w * d0
-                l1 -= w * d1
-                l2 -= w * d2
-            lanes[k], lanes[LANES + k], lanes[2 * LANES + k] = s0, s1, s2
-            lanes[3 * LANES + k], lanes[4 * LANES + k], lanes[5 * LANES + k] = s3, s4, s5
-            lanes[6 * LANES + k], lanes[7 * LANES + k], lanes[8 * LANES + k] = s6, s7, s8
-            laplace_x[i, 0], laplace_x[i, 1], laplace_x[i, 2] = l0, l1, l2
+        covariances(x, cells, first, size, lanes, laplace_x)
         fit_rotations(lanes, size)
         for k in range(size):
             for entry in range(9):
