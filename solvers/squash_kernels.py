@@ -159,95 +159,95 @@ def fit_pose_cells(x: Floats, cells: Cells, planes: Planes, gain: float, out: Fi
     count = len(cells.starts) - 1
     for block in prange((count + LANES - 1) // LANES):
         lanes, first = room[get_thread_id()], block * LANES
+        size = min(LANES, count - first)
         _covariances(x, cells, first, lanes, laplace_x)
-        fit_rotations(lanes, min(LANES, count - first))
-        for k in range(min(LANES, count - first)):
+        fit_rotations(lanes, size)
+        _stretch(lanes, size, planes, first)
+        _volume_scales(lanes, size, gain)
+        for k in range(size):
             i = first + k
-            faa, fab, fbb = _stretch(lanes, k, planes, i)
-            s, q, aa, ab, bb = _soft_axis(faa, fab, fbb)
-            scales[i] = s
-            along, across, rest = _volume_scales(s, q, gain)
-            aa, ab, bb = (
-                across - rest + (along - across) * aa,
-                (along - across) * ab,
-                across - rest + (along - across) * bb,
-            )
+            scales[i] = lanes[k]
+            aa, ab, bb = lanes[LANES + k], lanes[2 * LANES + k], lanes[3 * LANES + k]
+            off = lanes[4 * LANES + k]
+            a0, a1, a2 = axes[i, 0], axes[i, 1], axes[i, 2]
+            b0, b1, b2 = axes[i, 3], axes[i, 4], axes[i, 5]
             for row in range(3):
                 r0 = lanes[_R + 3 * row * LANES + k]
                 r1 = lanes[_R + (3 * row + 1) * LANES + k]
                 r2 = lanes[_R + (3 * row + 2) * LANES + k]
-                ra = r0 * axes[i, 0] + r1 * axes[i, 1] + r2 * axes[i, 2]
-                rb = r0 * axes[i, 3] + r1 * axes[i, 4] + r2 * axes[i, 5]
+                ra, rb = r0 * a0 + r1 * a1 + r2 * a2, r0 * b0 + r1 * b1 + r2 * b2
                 pa, pb = ra * aa + rb * ab, ra * ab + rb * bb
-                matrices[i, 3 * row] = rest * r0 + pa * axes[i, 0] + pb * axes[i, 3]
-                matrices[i, 3 * row + 1] = rest * r1 + pa * axes[i, 1] + pb * axes[i, 4]
-                matrices[i, 3 * row + 2] = rest * r2 + pa * axes[i, 2] + pb * axes[i, 5]
+                matrices[i, 3 * row] = off * r0 + pa * a0 + pb * b0
+                matrices[i, 3 * row + 1] = off * r1 + pa * a1 + pb * b1
+                matrices[i, 3 * row + 2] = off * r2 + pa * a2 + pb * b2
 
 
 @kernel
-def _stretch(lanes: Floats, k: int, planes: Planes, i: int) -> tuple[float, float, float]:
-    """The stretch of cell i, in column k, in its rest plane: symmetric (aa, ab, bb), I at rest."""
+def _stretch(lanes: Floats, size: int, planes: Planes, first: int) -> None:
+    """The stretch of each cell in its rest plane into rows 0 to 2 of `lanes`: aa, ab, bb.
+
+    It is R^T S between the rest axes a and b, over their extents: the identity at rest.
+    """
     axes, shares = planes.axes, planes.shares
-    a0, a1, a2 = axes[i, 0], axes[i, 1], axes[i, 2]
-    b0, b1, b2 = axes[i, 3], axes[i, 4], axes[i, 5]
-    faa = fab = fbb = 0.0
-    for row in range(3):
-        s0, s1, s2 = (
-            lanes[3 * row * LANES + k],
-            lanes[(3 * row + 1) * LANES + k],
-            lanes[(3 * row + 2) * LANES + k],
-        )
-        r0, r1, r2 = (
-            lanes[_R + 3 * row * LANES + k],
-            lanes[_R + (3 * row + 1) * LANES + k],
-            lanes[_R + (3 * row + 2) * LANES + k],
-        )
-        # The rest axes a and b, as R takes them and as S does.
-        ra, rb = r0 * a0 + r1 * a1 + r2 * a2, r0 * b0 + r1 * b1 + r2 * b2
-        sa, sb = s0 * a0 + s1 * a1 + s2 * a2, s0 * b0 + s1 * b1 + s2 * b2
-        faa += ra * sa
-        fab += ra * sb + rb * sa
-        fbb += rb * sb
-    wa, wb = shares[i, 0], shares[i, 1]
-    return wa * wa * faa + shares[i, 2], 0.5 * wa * wb * fab, wb * wb * fbb + shares[i, 3]
+    for k in range(size):
+        i = first + k
+        a0, a1, a2 = axes[i, 0], axes[i, 1], axes[i, 2]
+        b0, b1, b2 = axes[i, 3], axes[i, 4], axes[i, 5]
+        faa = fab = fbb = 0.0
+        for row in range(3):
+            s0 = lanes[3 * row * LANES + k]
+            s1 = lanes[(3 * row + 1) * LANES + k]
+            s2 = lanes[(3 * row + 2) * LANES + k]
+            r0 = lanes[_R + 3 * row * LANES + k]
+            r1 = lanes[_R + (3 * row + 1) * LANES + k]
+            r2 = lanes[_R + (3 * row + 2) * LANES + k]
+            ra, rb = r0 * a0 + r1 * a1 + r2 * a2, r0 * b0 + r1 * b1 + r2 * b2
+            sa, sb = s0 * a0 + s1 * a1 + s2 * a2, s0 * b0 + s1 * b1 + s2 * b2
+            faa += ra * sa
+            fab += ra * sb + rb * sa
+            fbb += rb * sb
+        wa, wb = shares[i, 0], shares[i, 1]
+        lanes[k] = wa * wa * faa + shares[i, 2]
+        lanes[LANES + k] = 0.5 * wa * wb * fab
+        lanes[2 * LANES + k] = wb * wb * fbb + shares[i, 3]
 
 
 @kernel
-def _volume_scales(s: float, q: float, gain: float) -> tuple[float, float, float]:
-    """The scales along and across the primary axis, g and c, and that off the plane, 1 / det.
+def _volume_scales(lanes: Floats, size: int, gain: float) -> None:
+    """From stretches in rows 0 to 2 of `lanes` the scale s, V less `off` (aa, ab, bb), and `off`.
 
-    In the plane V is c I + (g - c) W, whose determinant is c g where the axis is hard: then the
-    third scale is c too, as in the paper.
+    With the eigenvectors u and v of the stretch, the axis is W = q u u^T + (1 - q) v v^T; q is the
+    share of the larger strain in the sum of both, each to the power of 16. It is one but where both
+    are nearly as large: there an axis would flicker. In the plane V is c I + (g - c) W, and off it
+    what makes its determinant one: c as well where q is one, as in the paper.
 
-    Source: Celikcan et al. 2015, eqs. (10) and (12), with s' = 1 + gain (s - 1).
+    Source: Celikcan et al. 2015, eqs. (8), (10) and (12), with s' = 1 + gain (s - 1).
     """
-    g = min(max(1.0 + gain * (s - 1.0), LEAST_SCALE), LARGEST_SCALE)
-    c = 1.0 / math.sqrt(g)
-    return g, c, 1.0 / (c * g + (g - c) * (g - c) * q * (1.0 - q))
-
-
-@kernel
-def _soft_axis(faa: float, fab: float, fbb: float) -> tuple[float, float, float, float, float]:
-    """The scale s on the primary axis of a stretch [[faa, fab], [fab, fbb]], its hardness q, and W.
-
-    With the eigenvectors u and v, the axis is W = q u u^T + (1 - q) v v^T, given as (aa, ab, bb);
-    q is the share of the larger strain in the sum of both, each to the power of 16. It is one but
-    where both strains are nearly as large: there an axis would flicker.
-    """
-    middle, half = 0.5 * (faa + fbb), 0.5 * (faa - fbb)
-    radius = math.sqrt(half * half + fab * fab)
-    f = min(max(middle + radius, LEAST_SCALE), LARGEST_SCALE)
-    h = min(max(middle - radius, LEAST_SCALE), LARGEST_SCALE)
-    # f - 1/f is nearly twice log f: half the length weighs as much as double. Both times f h here.
-    first, second = (f * f - 1.0) * h, (h * h - 1.0) * f
-    first, second = first * first, second * second
-    ratio = min(first, second) / max(first, second, _TINY)
-    for _ in range(3):
+    for k in range(size):
+        faa, fab, fbb = lanes[k], lanes[LANES + k], lanes[2 * LANES + k]
+        middle, half = 0.5 * (faa + fbb), 0.5 * (faa - fbb)
+        radius = math.sqrt(half * half + fab * fab)
+        f = min(max(middle + radius, LEAST_SCALE), LARGEST_SCALE)
+        h = min(max(middle - radius, LEAST_SCALE), LARGEST_SCALE)
+        # f - 1/f is nearly twice log f: half the length weighs as much as double. Times f h here.
+        e, d = (f * f - 1.0) * h, (h * h - 1.0) * f
+        e, d = e * e, d * d
+        ratio = min(e, d) / max(e, d, _TINY)
         ratio *= ratio
-    q = 1.0 / (1.0 + ratio) if first >= second else ratio / (1.0 + ratio)
-    lean = (q - 0.5) / radius if radius > 1e-12 else 0.0
-    s = q * f + (1.0 - q) * h
-    return s, q, 0.5 + lean * half, lean * fab, 0.5 - lean * half
+        ratio *= ratio
+        ratio *= ratio
+        lesser = ratio / (1.0 + ratio)
+        q = 1.0 - lesser if e >= d else lesser
+        lean = (q - 0.5) / max(radius, 1e-12)
+        s = q * f + (1.0 - q) * h
+        g = min(max(1.0 + gain * (s - 1.0), LEAST_SCALE), LARGEST_SCALE)
+        c = 1.0 / math.sqrt(g)
+        off = 1.0 / (c * g + (g - c) * (g - c) * q * (1.0 - q))
+        lanes[k] = s
+        lanes[LANES + k] = c - off + (g - c) * (0.5 + lean * half)
+        lanes[2 * LANES + k] = (g - c) * lean * fab
+        lanes[3 * LANES + k] = c - off + (g - c) * (0.5 - lean * half)
+        lanes[4 * LANES + k] = off
 
 
 @parallel_kernel

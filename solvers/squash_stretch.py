@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 
 from solvers.arap import ArapSolver
 from solvers.arap_cells import SPOKES
-from solvers.laplacian import Floats
+from solvers.laplacian import Floats, Ints
 from solvers.squash_kernels import (
     Fit,
     Planes,
@@ -87,7 +87,7 @@ class SquashStretchSolver(ArapSolver):
         self._VR = np.empty((count, 9))
         rest = Fit(self._VR, self._scales, self._laplace_x, self._room)
         rest_covariances(self._rest, self._mesh.cells, rest)
-        self._planes = _planes(self._VR.reshape(-1, 3, 3))
+        self._planes = _planes(self._VR.reshape(-1, 3, 3), _normals(self._rest, self._layout.faces))
         self._shell = build_shell(self._rest, self._layout.faces, self._layout.parts)
         parts = int(self._layout.parts.max()) + 1
         self._strains = np.zeros(count)
@@ -141,6 +141,12 @@ class SquashStretchSolver(ArapSolver):
         """How each vertex's cell was turned by the last iteration, without its scale, (N, 3, 3)."""
         scaled = super().rotations()
         return scaled / self._cell_scales[self._layout.place][:, None, None]
+
+    def cell_matrices(self) -> Floats:
+        """How the last pose turned and stretched each vertex's cell, V R, (N, 3, 3)."""
+        if self._cartoon == 0.0:
+            return self.rotations()
+        return self._VR[self._layout.place].reshape(-1, 3, 3)
 
     @property
     def scales(self) -> Floats:
@@ -196,17 +202,42 @@ class SquashStretchSolver(ArapSolver):
         return np.column_stack([self._sums[:, 0], areas])
 
 
-def _planes(C: Floats) -> Planes:
-    """What the two states need to know of the cells, from their covariances at rest (N, 3, 3)."""
-    values, vectors = np.linalg.eigh(0.5 * (C + C.transpose(0, 2, 1)))
+def _normals(vertices: Floats, faces: Ints) -> Floats:
+    """The sum of the area vectors around each vertex (N, 3), over the sum of the areas."""
+    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
+    vectors = np.cross(b - a, c - a)
+    areas = np.linalg.norm(vectors, axis=1)
+    sums = np.zeros((len(vertices), 4))
+    for corner in range(3):
+        np.add.at(sums, faces[:, corner], np.column_stack([vectors, areas]))
+    return sums[:, :3] / np.maximum(sums[:, 3:], 1e-300)
+
+
+def _least_axis(C: Floats, strength: Floats, normals: Floats) -> Floats:
+    """The normal of each plane (N, 3): that given, or C's least axis where it is none."""
+    pulled = C - strength[:, None, None] * normals[:, :, None] * normals[:, None, :]
+    _, vectors = np.linalg.eigh(pulled)
+    least: Floats = vectors[:, :, 0]
+    return least
+
+
+def _planes(C: Floats, normals: Floats) -> Planes:
+    """What the two states need to know of the cells, from their covariances at rest (N, 3, 3).
+
+    A cell's plane is that of its normal, which on the edge of a box is well defined while the
+    second axis of its covariance is not; where faces have no common side, that of its covariance.
+    """
     extents = np.trace(C, axis1=1, axis2=2)
+    normals = _least_axis(C, 10.0 * extents, normals)
+    flat = np.eye(3) - normals[:, :, None] * normals[:, None, :]
+    _, vectors = np.linalg.eigh(flat @ C @ flat - extents[:, None, None] * (np.eye(3) - flat))
+    axes = vectors[:, :, [2, 1]]
+    pair = np.maximum(np.einsum("nik,nij,njk->nk", axes, C, axes), 0.0)
+    damped = pair**2 + (_THIN * pair.max(axis=1, keepdims=True)) ** 2
+    weights = np.sqrt(np.divide(pair, damped, out=np.zeros_like(pair), where=damped > 0.0))
     inverse = np.divide(1.0, extents, out=np.zeros_like(extents), where=extents > 1e-200)
-    largest = np.maximum(values[:, 2], 0.0)
-    pair = np.maximum(values[:, [2, 1]], 0.0)
-    damped = pair + _THIN * largest[:, None]
-    weights = np.divide(1.0, np.sqrt(damped), out=np.zeros_like(pair), where=damped > 1e-200)
     return Planes(
         extents=np.column_stack([extents, inverse]),
-        axes=np.concatenate([vectors[:, :, 2], vectors[:, :, 1]], axis=1),
+        axes=np.ascontiguousarray(np.swapaxes(axes, 1, 2)).reshape(-1, 6),
         shares=np.concatenate([weights, 1.0 - weights**2 * pair], axis=1),
     )
