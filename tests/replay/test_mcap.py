@@ -133,6 +133,35 @@ def test_other_tools_read_it_with_both_clocks(tmp_path: Path) -> None:
     assert {channel.topic for channel in summary.channels.values()} == {"/skeleton", "/performer/0"}
 
 
+def test_where_frames_came_from_comes_back_and_other_tools_see_it(tmp_path: Path) -> None:
+    path, facts = tmp_path / "a.mcap", {"origin": "sim://show", "began": "2026-01-01T00:00:00Z"}
+    with McapWriter(path, ARM, source=facts) as writer:
+        writer.write(arm_frame(0))
+    assert read_mcap(path).source == facts
+    with path.open("rb") as file:
+        found = {record.name: record.metadata for record in make_reader(file).iter_metadata()}
+    assert found["bunraku.source"] == facts
+
+
+@pytest.mark.filterwarnings("ignore:(start|end)_time is deprecated")  # old versions know no other
+def test_other_tools_enter_a_long_file_anywhere_by_performer(tmp_path: Path) -> None:
+    path = write(tmp_path / "a.mcap", [arm_frame(i, performer=i % 3) for i in range(900)])
+    with path.open("rb") as file:
+        found = make_reader(file, validate_crcs=True).iter_messages(
+            topics="/performer/1", start_time=int(20.0e9), end_time=int(25.0e9)
+        )
+        sequences = [message.sequence for _, _, message in found]
+    late = [i for i in range(1, 900, 3) if 20.0 <= i / 30 + 0.0123456789 < 25.0]
+    assert sequences == late
+
+
+def test_numbers_that_are_left_out_are_frames_that_were_lost(tmp_path: Path) -> None:
+    with McapWriter(tmp_path / "a.mcap", ARM) as writer:
+        for number in (0, 1, 5, 6, 8):
+            writer.write(arm_frame(number), number)
+    assert read_mcap(tmp_path / "a.mcap").notes[0].startswith("4 frames came but are not")
+
+
 def test_a_finished_file_is_entered_at_any_time(tmp_path: Path) -> None:
     frames = [arm_frame(i) for i in range(900)]
     path = write(tmp_path / "a.mcap", frames)

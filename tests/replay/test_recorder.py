@@ -207,6 +207,8 @@ def test_a_full_disk_ends_a_recording_with_one_line_and_a_file_that_opens(tmp_pa
     assert f"{len(recording)} frames are kept" in error
     assert told.startswith(f"bunraku: {len(recording)} frames in {path}, ")
     assert len(recording) > 0
+    assert len(recording.notes) == 1, "no half record is left at the end"
+    assert "never finished" in recording.notes[0]
     assert path.stat().st_size <= 400_000
     for performer in range(4):  # in order and without a hole, up to there
         assert np.diff(recording.of(performer).times) == pytest.approx(1 / RATE)
