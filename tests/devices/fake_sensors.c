@@ -224,8 +224,9 @@ uint32_t k4abt_tracker_enqueue_capture(void *tracker, void *capture, int32_t wai
 }
 uint32_t k4abt_tracker_pop_result(void *tracker, void **result, int32_t wait) {
     (void)tracker; (void)wait;
-    usleep(2000); /* the tracker is slower than the camera */
-    if (!waiting) return 2;
+    static int asked = 0;
+    usleep(2000); /* the tracker is slower than the camera, and than whoever waits for it */
+    if (!waiting || ++asked % 3) return 2;
     waiting--; opened++; *result = &tracked;
     return 0;
 }
