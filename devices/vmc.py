@@ -10,6 +10,7 @@ Source: sh-akira/VirtualMotionCaptureProtocol, marionette and performer specific
 from __future__ import annotations
 
 import math
+import struct
 from collections.abc import Callable, Mapping, Sequence
 from urllib.parse import SplitResult
 
@@ -298,8 +299,8 @@ class VmcDecoder:
         )
 
     def _repeated(self, arrival: float) -> bool:
-        """Whether the network brought the last frame again: the same pose, at once."""
-        content = self._pose.content
+        """Whether the network brought the last frame again: the same pose and time, at once."""
+        content = self._pose.content + struct.pack("d", self._time)
         last = self._last
         if last is not None and last[1] == content and arrival - last[0] < self._assembly.gap:
             return True
