@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from pathlib import Path
 from typing import Any
 from urllib.parse import SplitResult
 
@@ -67,6 +68,12 @@ def _share(text: str) -> float:
     return value
 
 
+def _file(text: str) -> str:
+    if not Path(text).is_file():
+        raise ValueError("there is no such file")
+    return text
+
+
 def _index(text: str) -> int:
     if not (text.isascii() and text.isdigit() and len(text) < 4):
         raise ValueError("expected a number from 0")
@@ -85,6 +92,7 @@ KINDS: Mapping[
             "depth": one_of(*kinect_azure.DEPTH_MODES),
             "processing": one_of(*kinect_azure.PROCESSING),
             "smoothing": _share,
+            "model": _file,
         },
         _open_azure,
     ),

@@ -24,8 +24,19 @@ from devices.kinect_bodies import Body, Sensor, Sight
 from devices.kinect_joints import AZURE_TO_WORLD, KINECT_AZURE
 from devices.sdk_library import SensorLostError
 
-LIBRARIES = ("k4a.dll", "libk4a.so.1.4", "libk4a.so")
-TRACKER_LIBRARIES = ("k4abt.dll", "libk4abt.so.1.1", "libk4abt.so")
+_PROGRAMS = "C:/Program Files"
+LIBRARIES = (
+    "k4a.dll",
+    f"{_PROGRAMS}/Azure Kinect SDK v1.4.1/sdk/windows-desktop/amd64/release/bin/k4a.dll",
+    "libk4a.so.1.4",
+    "libk4a.so",
+)
+TRACKER_LIBRARIES = (
+    "k4abt.dll",
+    f"{_PROGRAMS}/Azure Kinect Body Tracking SDK/tools/k4abt.dll",
+    "libk4abt.so.1.1",
+    "libk4abt.so",
+)
 MISSING = (
     "cannot open kinect://azure: {} is not here; install the Azure Kinect Sensor SDK 1.4 (or "
     "Orbbec's K4A wrapper) and the Body Tracking SDK 1.1 (or run `bunraku bridge` where they are)"
@@ -155,12 +166,16 @@ SENSOR = Sensor(KINECT_AZURE, AZURE_TO_WORLD, ("FootLeft", "FootRight"), read_si
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """How the camera and the tracker run; the fields are those of the address's options."""
+    """How the camera and the tracker run; the fields are those of the address's options.
+
+    `model` is the file of the tracker's network; where it is empty the tracker looks for it.
+    """
 
     device: int = 0
     depth: str = "nfov"
     processing: str = "gpu"
     smoothing: float = 0.0
+    model: str = ""
 
 
 class KinectAzure:
@@ -208,13 +223,15 @@ class KinectAzure:
             raise InputError(f"{where} does not start; close other programs that use it")
         if self._k4a.k4a_device_get_calibration(self._device, depth, 0, self._calibration):
             raise InputError(f"{where} gives no calibration; update its firmware")
-        tracker = TrackerConfiguration(processing_mode=PROCESSING[setup.processing])
+        tracker = TrackerConfiguration(
+            processing_mode=PROCESSING[setup.processing], model_path=setup.model.encode() or None
+        )
         if self._k4abt.k4abt_tracker_create(
             self._calibration, tracker, ctypes.byref(self._tracker)
         ):
             raise InputError(
-                f"{where}: no body tracker on {setup.processing}; try ?processing=cpu, and see "
-                "that the tracker's model lies beside its library"
+                f"{where}: no body tracker on {setup.processing}; try ?processing=cpu, or name "
+                "the tracker's network: ?model=dnn_model_2_0_op11.onnx"
             )
         self._k4abt.k4abt_tracker_set_temporal_smoothing(self._tracker, setup.smoothing)
 

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import ctypes
+import ctypes.util
 import threading
 import time
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Protocol
 
 from devices.errors import InputError
 from devices.live_stream import Deliver
 
 RETRY = 1.0  # [s] until a sensor that was lost is opened again
+_BESIDE_ITSELF = 0x8  # LOAD_WITH_ALTERED_SEARCH_PATH
 
 
 class SensorLostError(Exception):
@@ -99,14 +102,25 @@ class SensorTransport:
 def load_library(names: Sequence[str], missing: str) -> ctypes.CDLL:
     """The first of the libraries `names` that this machine has.
 
+    On Windows a name is looked for in the system's folder and along PATH, but never in the current
+    folder, where anybody may have put it; what the library needs may lie beside it.
+
     Raises:
         InputError: there is none; the message is `missing`.
     """
-    load = getattr(ctypes, "WinDLL", ctypes.CDLL)
     for name in names:
         try:
-            library: ctypes.CDLL = load(name)
+            return _load(name)
         except OSError:
             continue
-        return library
     raise InputError(missing)
+
+
+def _load(name: str) -> ctypes.CDLL:
+    windows: Callable[..., ctypes.CDLL] | None = getattr(ctypes, "WinDLL", None)
+    if windows is None:
+        return ctypes.CDLL(name)
+    found = ctypes.util.find_library(name)
+    if found is None or not Path(found).is_absolute():
+        return windows(name)
+    return windows(found, winmode=_BESIDE_ITSELF)

@@ -462,3 +462,20 @@ def _no_makers_library(monkeypatch: pytest.MonkeyPatch) -> None:
     """Should a maker's library be installed where the tests run, they must not open it."""
     for module in (kinect_v1, kinect_v2, kinect_azure, leapc):
         monkeypatch.setattr(module, "LIBRARIES", ("no-such-library",))
+
+
+@pytest.mark.parametrize(("found", "flags"), [(True, [8]), (False, [])])
+def test_on_windows_a_library_s_own_needs_may_lie_beside_it(
+    found: bool, flags: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loaded: list[tuple[str, list[int]]] = []
+    where = str(tmp_path / "k4a.dll") if found else None
+
+    def windows(name: str, **more: int) -> object:
+        loaded.append((name, list(more.values())))
+        return fake
+
+    monkeypatch.setattr("ctypes.WinDLL", windows, raising=False)
+    monkeypatch.setattr("ctypes.util.find_library", lambda _name: where)
+    assert sdk_library.load_library(["k4a.dll"], "missing") is fake
+    assert loaded == [(where or "k4a.dll", flags)]
