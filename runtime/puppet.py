@@ -12,10 +12,12 @@ from scipy.spatial.transform import Rotation
 from devices.errors import InputError
 from runtime.character import Character
 from runtime.exaggeration import Exaggeration, Strain
+from runtime.grip import Grip
 from runtime.mapping import Drive, Mapping
 from runtime.performer import Pose, Rest
 from runtime.skin import Anchors, Skin
 from solvers.abstraction import abstract
+from solvers.handles import HARD
 from solvers.heading import turn_about, turned
 from solvers.polyline_motion import ChainRetarget
 from solvers.skeleton_pose import SkeletonPose
@@ -155,6 +157,20 @@ class Puppet:
         lengths = [_chain_length(self.tree.positions, chain) for chain in chains]
         height = float(np.ptp(self.character.vertices[:, 1]))
         self._exaggeration = Exaggeration(np.array(lengths), height)
+        self._grip = Grip(len(chains))
+        self._seen = np.ones(len(chains), dtype=np.bool_)
+        self._limb_of_anchor = self._chain_above()[np.where(self._bone >= 0, self._bone, node)]
+        self.skin.weigh(np.full(len(node), HARD))
+
+    def _chain_above(self) -> Indices:
+        """For each node the chain that moves it, or that it rides on; -1 for none."""
+        chain_of = np.full(len(self.tree), -1, dtype=np.int64)
+        for number, chain in enumerate(self._chains):
+            chain_of[list(chain[1:])] = number
+        for node in self._order:
+            if chain_of[node] < 0 and self._parents[node] >= 0:
+                chain_of[node] = chain_of[self._parents[node]]
+        return chain_of
 
     def rehearse(self, poses: Sequence[Pose]) -> Array:
         """Go through poses, holding back limbs whose surface cannot follow them.
@@ -253,6 +269,9 @@ class Puppet:
         self._turn = pose.heading - rest.heading if self._body.turns else 0.0
         self._lift = self._body.lift * float(pose.hips[1] - rest.height)
         self._time = pose.time
+        self._seen = np.array(
+            [not pose.filled[drive.source[-1]] for drive in self.mapping.drives], dtype=np.bool_
+        )
 
     def _pose_nodes(self, turns: list[Array]) -> None:
         self._rotations, self._posed = self._skeleton_pose.pose(turns)
@@ -264,6 +283,8 @@ class Puppet:
 
     def deform(self) -> Motion:
         """Let the surface follow the nodes, and the whole follow the performer's body."""
+        if self._grip.follow(self._time, self._seen):
+            self.skin.weigh(np.append(self._grip.weights, HARD)[self._limb_of_anchor])
         strain = self._strain()
         self._positions = self._stretched(strain)
         return self._with_body(self.skin.deform(self._anchors(strain), self.iterations))

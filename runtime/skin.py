@@ -12,6 +12,7 @@ from runtime.character import Character
 from runtime.characters.proxy import proxy_of
 from solvers.binding import bind
 from solvers.edges import unique_edges
+from solvers.handles import HARD
 from solvers.squash_stretch import SquashStretchSolver
 from solvers.tree import Tree
 
@@ -88,6 +89,7 @@ class Skin:
         bones = tree.positions[self.binding.node] - tree.positions[self.binding.pivot]
         long = np.linalg.norm(bones, axis=1, keepdims=True)
         self._axes = np.divide(bones, long, out=np.zeros_like(bones), where=long > 0.0)
+        self._weights = np.full(len(bones), HARD)
         self._answer = np.empty_like(self.rest)
         self.elasticity = Elasticity()
 
@@ -106,6 +108,12 @@ class Skin:
     def energy(self) -> float:
         """The energy of the surface as it was last deformed [m^2]."""
         return self._solver.energy
+
+    def weigh(self, weights: Array) -> None:
+        """Hold the surface at each anchor as firmly as (A,) says: see `ArapSolver.hold`."""
+        if not np.array_equal(weights, self._weights):
+            self._solver.weigh(weights[self._group])
+            self._weights = weights
 
     def reset(self) -> None:
         """Forget the last answer."""
