@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from runtime.conditioning.body import Body
-from solvers.continuity import exchanged, expected
+from solvers.continuity import LEAST_WRONG, exchanged, expected
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -108,13 +108,18 @@ class Faults:
         wanted = expected(trust.place, trust.velocity, np.where(fresh, gap, 0.0))
         wanted[~fresh] = np.nan
         swapped = rejected = self._nothing
-        if swaps and len(self._since):
+        distance = _distance(positions, wanted)
+        if swaps and len(self._since) and (distance > LEAST_WRONG).any():  # else nothing can be
             swapped = self._exchanged(positions, wanted, time)
             if swapped.any():
                 positions = np.where(swapped[:, None], positions[self._body.partner], positions)
+                distance = _distance(positions, wanted)
+        elif swaps:
+            self._since[:] = np.nan
+            self._straight[np.isnan(self._straight)] = time
         seen = np.isfinite(positions[:, 0])
         if outliers:
-            rejected = seen & self._doubtful(positions, wanted, gap, seen, time)
+            rejected = seen & self._doubtful(positions, distance, gap, seen, time)
             if rejected.any():
                 positions = np.where(rejected[:, None], np.nan, positions)
                 seen = seen & ~rejected
@@ -145,14 +150,11 @@ class Faults:
         return joints
 
     def _doubtful(
-        self, positions: Array, wanted: Array, gap: Array, seen: Bools, time: float
+        self, positions: Array, distance: Array, gap: Array, seen: Bools, time: float
     ) -> Bools:
         trust = self._trust
-        offset = positions - wanted
-        distance = np.sqrt(np.einsum("ij,ij->i", offset, offset))
-        far: Bools = distance > JUMP + FASTEST * np.minimum(
-            gap, LONGEST_REACH
-        )  # False where nothing is expected
+        reach = JUMP + FASTEST * np.clip(gap, 0.0, LONGEST_REACH)
+        far: Bools = distance > reach  # False where nothing is expected
         far &= trust.times >= BELIEVED
         stretched = self._stretched(positions, distance)
         if not far.any():
@@ -183,8 +185,7 @@ class Faults:
         needs to confirm them: the usual length gives way with time.
         """
         body, trust = self._body, self._trust
-        ends = positions[body.bones] - positions[body.near]
-        length = np.sqrt(np.einsum("ij,ij->i", ends, ends))
+        length = _distance(positions[body.bones], positions[body.near])
         known = np.isfinite(length) & (length > 0.0)
         length = np.where(known, length, 1.0)
         usual = np.where(trust.measured > 0, trust.lengths, length)
@@ -214,3 +215,10 @@ class Faults:
         trust.place = np.where(seen[:, None], positions, trust.place)
         trust.times = np.where(seen, np.where(again, trust.times, 0) + 1, trust.times)
         trust.at = np.where(seen, time, trust.at)
+
+
+def _distance(a: Array, b: Array) -> Array:
+    """How far apart (n,) points are; NaN where one is unknown."""
+    offset = a - b
+    apart: Array = np.sqrt(np.einsum("ij,ij->i", offset, offset))
+    return apart

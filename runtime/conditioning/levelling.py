@@ -16,6 +16,7 @@ from solvers.floor_plane import FloorFit
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 
+EVERY, LONGEST = 0.1, 0.5  # [s] between two looks at the feet
 STILL = 0.25  # [m/s] a foot that stands is slower
 LOWEST = 0.05  # [m] and no higher above the lowest foot
 JUMPED = 0.15  # [m] above the floor as known, where a foot is in the air
@@ -46,8 +47,10 @@ class Levelling:
         if not len(feet):
             return
         before, elapsed = self._feet, time - self._at
+        if before is not None and 0.0 <= elapsed < EVERY:
+            return
         self._feet, self._at = positions[feet], time
-        if before is None or not 0.0 < elapsed < 0.5:
+        if before is None or not 0.0 < elapsed < LONGEST:
             return
         move = self._feet - before
         still = np.einsum("ij,ij->i", move, move) < (STILL * elapsed) ** 2

@@ -371,3 +371,27 @@ def test_a_mirror_that_is_switched_turns_the_character_over(puppet: Puppet) -> N
     assert tops[1][0] > tops[0][0] + 0.3
     np.testing.assert_allclose(tops[2], tops[1][::-1], atol=0.03)
     np.testing.assert_allclose(tops[3], tops[1], atol=1e-9)
+
+
+def test_a_pose_that_is_held_becomes_the_rest_state_without_a_hand_free(puppet: Puppet) -> None:
+    switches = filled_only()
+    switches.recalibrate = True
+    puppet.rest()
+    performer = Performer(BODY, conditioning=switches)
+    director = Director(performer, [puppet], lambda: FRONT_VIEW, Choices(), [Mapping(ARMS)])
+    bent = {"ElbowLeft": (0.0, 0.0, 1.5), "ElbowRight": (0.0, 1.5, 0.0)}
+    wire = Wire([captured(pose(bent if i == 0 else T_POSE), i / 10.0) for i in range(14)])
+    kept = Kept()
+    loop = FrameLoop(
+        wire,
+        performer,
+        [puppet],
+        director=director,
+        report=Report(None),
+        theatre=None,
+        outputs=[[kept]],
+    )
+    play(loop, wire)
+    off = [np.abs(each.vertices - puppet.character.vertices).max() for each in kept.frames]
+    assert min(off[2:10]) > 0.1, "driven from the bent pose"
+    assert off[-1] < 0.01, "and then from the T"
