@@ -12,7 +12,7 @@ from runtime.character import Character
 from runtime.characters.proxy import proxy_of
 from solvers.binding import bind
 from solvers.edges import unique_edges
-from solvers.handles import HARD
+from solvers.handles import HARD, group_targets
 from solvers.squash_stretch import SquashStretchSolver
 from solvers.tree import Tree
 
@@ -126,8 +126,8 @@ class Skin:
         along = np.einsum("ai,aj->aij", self._axes, self._axes)
         thin = anchors.lengths ** (-0.5 * self._elasticity.volume_gain)
         strain = thin[:, None, None] * np.eye(3) + (anchors.lengths - thin)[:, None, None] * along
-        moved = np.einsum("aij,ajk->aik", anchors.whole @ turn, strain)[self._group]
-        targets = np.einsum("hij,hj->hi", moved, self._offsets) + anchors.pivots[self._group]
+        moved = anchors.whole @ turn @ strain
+        targets = group_targets(self._offsets, self._group, moved, anchors.pivots)
         return self._solver.solve(targets, iterations, out=self._answer)
 
     def cover(self, deformed: Array) -> Array:

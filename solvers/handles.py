@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.spatial import KDTree
 
 from solvers.arap_layout import Layout, check_range, checked_integers
+from solvers.compiled import kernel
 from solvers.laplacian import Floats, Ints
 
 HARD = np.inf  # the weight of a handle that is met exactly
@@ -98,3 +99,29 @@ def nearest_groups(rest: Floats, carried: Ints, handles: Handles, parts: Ints) -
     nearest = np.zeros(int(parts.max()) + 1, dtype=np.int64)
     nearest[part_of[nearest_first][where]] = handles.group_of[handle[nearest_first][where]]
     return nearest[part_of]
+
+
+def group_targets(offsets: Floats, group_of: Ints, turns: Floats, positions: Floats) -> Floats:
+    """Targets (H, 3) of handles whose groups have a position and a rotation each.
+
+    Args:
+        offsets: (H, 3) of each handle from its group's origin, at rest.
+        group_of: (H,) the group of each, 0 to G - 1.
+        turns: (G, 3, 3) rotations, or any other linear maps, of the groups.
+        positions: (G, 3) where their origins are.
+    """
+    targets = np.empty_like(offsets)
+    _move_groups(offsets, group_of, turns, positions, targets)
+    return targets
+
+
+@kernel
+def _move_groups(
+    offsets: Floats, group_of: Ints, turns: Floats, positions: Floats, out: Floats
+) -> None:
+    for h in range(len(offsets)):
+        g = group_of[h]
+        for i in range(3):
+            out[h, i] = positions[g, i]
+            for j in range(3):
+                out[h, i] += turns[g, i, j] * offsets[h, j]

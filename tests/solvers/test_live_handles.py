@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from solvers.arap import ArapSolver
+from solvers.handles import group_targets
 
 
 def tube(rings: int = 40, around: int = 16) -> tuple[np.ndarray, np.ndarray]:
@@ -178,3 +179,15 @@ def test_bad_weights_are_named_and_change_nothing(weights: list[float], message:
     with pytest.raises(ValueError, match=message):
         solver.weigh(weights)
     np.testing.assert_array_equal(solver.solve(POINTS[ENDS] * 1.1, 3), before)
+
+
+def test_groups_with_a_position_and_a_rotation_take_their_handles_along():
+    turn = Rotation.from_rotvec([[0.0, 0.0, 0.0], [0.4, -0.2, 1.1]])
+    centres = np.stack([POINTS[RINGS[0]].mean(axis=0), POINTS[RINGS[-1]].mean(axis=0)])
+    offsets = POINTS[ENDS] - centres[GROUPS]
+    positions = np.add(centres, [[0.0, 0.0, 0.0], [-3.0, 2.0, 0.5]])
+    targets = group_targets(offsets, GROUPS, turn.as_matrix(), positions)
+    np.testing.assert_allclose(targets[:16], POINTS[RINGS[0]], atol=1e-12)
+    np.testing.assert_allclose(targets[16:], turn[1].apply(offsets[16:]) + positions[1], atol=1e-12)
+    answer = ArapSolver(POINTS, FACES, ENDS, groups=GROUPS).solve(targets, 1)
+    np.testing.assert_array_equal(answer[ENDS], targets)
