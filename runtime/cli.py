@@ -314,6 +314,12 @@ def parser() -> argparse.ArgumentParser:
         "--rate", type=positive, metavar="HZ", help="of a BVH file (default: the recording's)"
     )
     convert.add_argument("--force", action="store_true", help="replace OUT if it is there")
+    figures = add(
+        "figures", _command("figures", "figures"), "draw the figures on squash and stretch"
+    )
+    figures.add_argument("folder", type=Path, metavar="DIR", help="where the pictures go")
+    figures.add_argument("--size", type=size, default=(1500, 420), metavar="WxH", help="of a row")
+    _characters(figures, required=False)
     doctor = add("doctor", _command("doctor", "doctor"), "what is wrong with this machine")
     doctor.add_argument("--warm", action="store_true", help="compile the solvers ahead of time")
     bench = add("bench", _command("bench", "bench"), "how fast it is here")
@@ -321,11 +327,14 @@ def parser() -> argparse.ArgumentParser:
         "name",
         nargs="?",
         metavar="NAME",
-        help="arap, tick or match, all if absent; soak or kill, which take long",
+        help="arap, tick or match, all if absent; soak, kill or latency, which take long",
     )
     bench.add_argument("--seconds", type=positive, help="of show in `bench soak` (default 3600)")
     bench.add_argument(
         "--real-time", action="store_true", help="soak at 60 Hz, not as fast as it goes"
+    )
+    bench.add_argument(
+        "--load", action="store_true", help="latency also beside a process that loads one core"
     )
     bench.add_argument("--json", type=Path, metavar="FILE", help="write the figures there as well")
     return top

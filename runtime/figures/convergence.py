@@ -1,0 +1,187 @@
+"""How fast energies fall: ours and the plain equations from a cold start, drawn as curves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from PIL import Image, ImageDraw, ImageFont
+from scipy.spatial.transform import Rotation
+
+from runtime.figures.plain import PlainSolver
+from solvers.arap import ArapSolver
+from solvers.laplacian import Floats, Ints
+from solvers.squash_stretch import SquashStretchSolver
+
+FRAMES = 60
+SHARES = (0.30, 0.20, 0.10, 0.05)
+
+_FINER = 2  # drawn this much larger, for smooth edges
+_SETTLED = 400  # iterations after which the plain equations count as settled
+_INK, _PAPER, _GRID = (58, 48, 40), (250, 246, 238), (226, 218, 204)
+_COLOURS = {
+    "ARAP, plain": (196, 178, 150),
+    "ARAP, ours": (61, 165, 160),
+    "squash and stretch, plain": (224, 168, 148),
+    "squash and stretch, ours": (196, 74, 44),
+}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Curves:
+    """One constraint: what its energies are after each iteration, by method, as shares (K,).
+
+    One is the energy of the cold start, zero the lowest that either of the two methods with the
+    same energy comes to.
+    """
+
+    name: str
+    shares: dict[str, Floats]
+
+    def iterations_to(self, method: str, share: float) -> int | None:
+        """How many iterations it takes to come down to a share; None for more than there are."""
+        below = np.flatnonzero(self.shares[method] <= share)
+        return int(below[0]) if len(below) else None
+
+
+def measure() -> list[Curves]:
+    """The curves of four constraints on a round bar with patches at both ends."""
+    vertices, faces = _bar()
+    x = vertices[:, 0]
+    handles = np.flatnonzero((x < 0.3) | (x > 3.7))
+    right = (x[handles] > 2.0)[:, None]
+    ends = vertices[handles]
+    middle, pull = np.array([2.0, 0.0, 0.0]), np.array([1.2, 0.0, 0.0])
+    bend, twist = Rotation.from_rotvec([0, 0, 1.4]), Rotation.from_rotvec([1.6, 0, 0])
+    constraints = {
+        "bend": np.where(right, bend.apply(ends - middle) + middle, ends),
+        "twist": np.where(right, twist.apply(ends), ends),
+        "squash": ends - right * pull,
+        "stretch": ends + right * pull,
+    }
+    return [
+        _curves(name, vertices, faces, handles, targets) for name, targets in constraints.items()
+    ]
+
+
+def _curves(name: str, vertices: Floats, faces: Ints, handles: Ints, targets: Floats) -> Curves:
+    plain = PlainSolver(vertices, faces, handles)
+    groups = (vertices[handles, 0] > 2.0).astype(np.int64)
+    rigid = ArapSolver(vertices, faces, handles, groups=groups)
+    scaled = SquashStretchSolver(vertices, faces, handles, groups=groups)
+    shares: dict[str, Floats] = {}
+    for title, ours, iterations, step, energy in (
+        ("ARAP", rigid, 1, plain.rigid_step, plain.rigid_energy),
+        ("squash and stretch", scaled, 2, plain.scaled_step, plain.scaled_energy),
+    ):
+        slow = _plain_energies(plain.cold_start(targets), step, energy)
+        # Two iterations of ours are one of the shape state, whose energy this is, and the pose.
+        ours.solve(targets, 0)
+        fast = [ours.energy]
+        for _ in range(FRAMES):
+            ours.solve(targets, iterations)
+            fast.append(ours.energy)
+        lowest = min(*slow, *fast)
+        shares[f"{title}, plain"] = (slow[: FRAMES + 1] - lowest) / (slow[0] - lowest)
+        shares[f"{title}, ours"] = (np.array(fast) - lowest) / (slow[0] - lowest)
+    return Curves(name, shares)
+
+
+def _plain_energies(
+    x: Floats, step: Callable[[Floats], Floats], energy: Callable[[Floats], float]
+) -> Floats:
+    energies = [energy(x)]
+    for _ in range(FRAMES):
+        x = step(x)
+        energies.append(energy(x))
+    for _ in range(_SETTLED - FRAMES):
+        x = step(x)
+    return np.array([*energies, energy(x)])
+
+
+def _bar(rings: int = 36, around: int = 16) -> tuple[Floats, Ints]:
+    """A closed round bar along x, of length 4 and radius 0.5."""
+    x = np.linspace(0.0, 4.0, rings)
+    angle = 2 * np.pi * (np.arange(around) + 0.5 * (np.arange(rings)[:, None] % 2)) / around
+    long = np.broadcast_to(x[:, None], angle.shape)
+    tube = np.stack([long, 0.5 * np.cos(angle), 0.5 * np.sin(angle)], axis=-1).reshape(-1, 3)
+    i, k = (index.ravel() for index in np.mgrid[: rings - 1, :around])
+    a, b = i * around + k, i * around + (k + 1) % around
+    c, d = a + around, b + around
+    odd = (i % 2 == 1)[:, None]
+    first = np.where(odd, np.stack([a, b, d], 1), np.stack([a, b, c], 1))
+    second = np.where(odd, np.stack([a, d, c], 1), np.stack([b, d, c], 1))
+    k, last = np.arange(around), len(tube)
+    start = np.stack([np.full(around, last), (k + 1) % around, k], axis=1)
+    end = np.stack([np.full(around, last + 1), k, (k + 1) % around], axis=1)
+    end[:, 1:] += last - around
+    vertices = np.vstack([tube, [-0.1, 0.0, 0.0], [4.1, 0.0, 0.0]])
+    return vertices, np.concatenate([first, second, start, end]).astype(np.int64)
+
+
+def draw(curves: list[Curves], size: tuple[int, int]) -> Image.Image:
+    """The curves as a picture: a panel for each constraint, two to a row, a legend below."""
+    width, height = _FINER * size[0], _FINER * size[1]
+    picture = Image.new("RGB", (width, height), _PAPER)
+    pen = ImageDraw.Draw(picture)
+    legend = height // 12
+    rows = (len(curves) + 1) // 2
+    for index, curve in enumerate(curves):
+        left, top = (index % 2) * width // 2, index // 2 * (height - legend) // rows
+        _draw_panel(pen, curve, (left, top, left + width // 2, top + (height - legend) // rows))
+    font = ImageFont.load_default(max(height // 40, 8))
+    for index, method in enumerate(_COLOURS):
+        x = width // 20 + index * width // 4
+        y = height - legend // 2
+        _stroke(pen, [(x, y), (x + width // 30, y)], method, height // 150)
+        pen.text((x + width // 26, y), method, fill=_INK, font=font, anchor="lm")
+    return picture.resize(size, Image.Resampling.LANCZOS)
+
+
+def _draw_panel(pen: ImageDraw.ImageDraw, curve: Curves, box: tuple[int, int, int, int]) -> None:
+    left, top, right, bottom = box
+    pad = (bottom - top) // 9
+    left, top, right, bottom = left + int(1.6 * pad), top + pad, right - pad // 2, bottom - pad
+    font = ImageFont.load_default(max(pad // 2, 8))
+
+    def at(iteration: int, share: float) -> tuple[float, float]:
+        return left + iteration / FRAMES * (right - left), bottom - min(share, 1.0) * (bottom - top)
+
+    for share in (1.0, *SHARES):
+        height = at(0, share)[1]
+        pen.line([(left, height), (right, height)], fill=_GRID, width=_FINER)
+        if share != SHARES[-1]:  # too near to the one above
+            text = f"{share:.0%}"
+            pen.text((left - pad // 4, height), text, fill=_INK, font=font, anchor="rm")
+    for iteration in range(0, FRAMES + 1, 20):
+        place = (at(iteration, 0.0)[0], bottom + pad // 4)
+        pen.text(place, str(iteration), fill=_INK, font=font, anchor="mt")
+    pen.text((right, top + pad // 3), curve.name, fill=_INK, font=font, anchor="rt")
+    for method, shares in curve.shares.items():
+        points = [at(k, float(share)) for k, share in enumerate(shares)]
+        _stroke(pen, points, method, pad // 10)
+        reached = curve.iterations_to(method, SHARES[-1])
+        if reached is not None:
+            x, y, r = *points[reached], pad // 6
+            pen.ellipse([x - r, y - r, x + r, y + r], fill=_COLOURS[method])
+
+
+def _stroke(
+    pen: ImageDraw.ImageDraw, points: list[tuple[float, float]], method: str, width: int
+) -> None:
+    """A line in a method's colour; the plain ones are wider, to be seen under ours."""
+    wide = max(width, 2) * (2 if method.endswith("plain") else 1)
+    pen.line(points, fill=_COLOURS[method], width=wide, joint="curve")
+
+
+def table(curves: list[Curves]) -> list[str]:
+    """Lines of text: the iterations that each method takes to each share."""
+    heads = "".join(f"{f'{share:.0%}':>6}" for share in SHARES)
+    lines = [f"{'iterations to':34}{heads}"]
+    for curve in curves:
+        for method in _COLOURS:
+            counts = [curve.iterations_to(method, share) for share in SHARES]
+            cells = "".join(f"{'-' if count is None else count:>6}" for count in counts)
+            lines.append(f"{curve.name:8}{method:26}{cells}")
+    return lines

@@ -1,0 +1,126 @@
+"""The equations as the papers write them, in NumPy: no warm start, no fused kernels, no pressure.
+
+What our solvers are compared with in the figures: as-rigid-as-possible deformation (Sorkine and
+Alexa 2007), the scaled-shape state (Celikcan et al. 2015, eqs. (4) to (9)), and deformation under
+one constraint on the whole volume (in the manner of Huang et al. 2006, Subspace gradient domain
+mesh deformation, section 3; in the full space, with the one multiplier found along its gradient).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+import scipy.sparse.linalg as spla
+
+from solvers.laplacian import Floats, Ints, cotangent_edges, graph_laplacian
+
+
+class PlainSolver:
+    """One surface, vertices (N, 3) and faces (F, 3), held at handles (H,)."""
+
+    def __init__(self, vertices: Floats, faces: Ints, handles: Ints) -> None:
+        edges = cotangent_edges(vertices, faces)
+        self._rest, self._faces, self._handles = vertices, faces, handles
+        self._tails = np.concatenate([edges.pairs[:, 0], edges.pairs[:, 1]])
+        self._heads = np.concatenate([edges.pairs[:, 1], edges.pairs[:, 0]])
+        self._weights = np.tile(edges.weights, 2)
+        self._edges = vertices[self._tails] - vertices[self._heads]
+        count = len(vertices)
+        slots = np.arange(len(self._tails))
+        self._sum = sp.csr_matrix((np.ones(len(slots)), (self._tails, slots)), (count, len(slots)))
+        laplacian = graph_laplacian(edges, count)
+        self._free = np.setdiff1d(np.arange(count), handles)
+        self._coupling = laplacian[self._free][:, handles]
+        self._factor = spla.splu(sp.csc_matrix(laplacian[self._free][:, self._free]))
+        self._volume = volume(vertices, faces)
+
+    def cold_start(self, targets: Floats) -> Floats:
+        """The first guess for handles at their targets (H, 3): no cell is turned.
+
+        Source: Celikcan et al. 2015, eq. (3); Lipman et al. 2004.
+        """
+        x = self._rest.copy()
+        x[self._handles] = targets
+        return self._surface(x, np.tile(np.eye(3), (len(x), 1, 1)))
+
+    def rigid_step(self, x: Floats) -> Floats:
+        """A local and a global step. Sorkine and Alexa 2007, eqs. (6) and (9)."""
+        return self._surface(x, self._rotations(x))
+
+    def scaled_step(self, x: Floats) -> Floats:
+        """A local and a global step of the scaled-shape state. Celikcan et al. 2015, eqs. (5-9)."""
+        R = self._rotations(x)
+        return self._surface(x, self._scales(x, R)[:, None, None] * R)
+
+    def whole_volume_step(self, x: Floats) -> Floats:
+        """A local and a global step under one hard constraint: the whole volume stays.
+
+        The stationary point of the energy plus a multiplier times the volume lies along L^-1 times
+        the volume's gradient; Newton's method finds the multiplier.
+        """
+        x = self.rigid_step(x)
+        push = np.zeros_like(x)
+        push[self._free] = self._factor.solve(volume_gradient(x, self._faces)[self._free])
+        multiplier = 0.0
+        for _ in range(8):
+            moved = x + multiplier * push
+            slope = float((volume_gradient(moved, self._faces) * push).sum())
+            multiplier -= (volume(moved, self._faces) - self._volume) / slope
+        return x + multiplier * push
+
+    def rigid_energy(self, x: Floats) -> float:
+        """Sorkine and Alexa 2007, eq. (7), under the best rotations."""
+        return self._energy(x, self._rotations(x))
+
+    def scaled_energy(self, x: Floats) -> float:
+        """Celikcan et al. 2015, eq. (4), under the best rotations and scales."""
+        R = self._rotations(x)
+        return self._energy(x, self._scales(x, R)[:, None, None] * R)
+
+    def _summed(self, terms: Floats) -> Floats:
+        flat: Floats = self._sum @ terms.reshape(len(terms), -1)
+        return flat.reshape(-1, *terms.shape[1:])
+
+    def _rotations(self, x: Floats) -> Floats:
+        moved = self._weights[:, None] * (x[self._tails] - x[self._heads])
+        S = self._summed(moved[:, :, None] * self._edges[:, None, :])
+        U, _, Vt = np.linalg.svd(S)
+        U[:, :, 2] *= np.sign(np.linalg.det(U @ Vt))[:, None]
+        R: Floats = U @ Vt
+        return R
+
+    def _scales(self, x: Floats, R: Floats) -> Floats:
+        turned = np.einsum("eij,ej->ei", R[self._tails], self._edges)
+        moved = x[self._tails] - x[self._heads]
+        above = self._summed(self._weights * np.einsum("ei,ei->e", moved, turned))
+        below = self._summed(self._weights * np.einsum("ei,ei->e", turned, turned))
+        return above / np.maximum(below, 1e-300)
+
+    def _surface(self, x: Floats, matrices: Floats) -> Floats:
+        mean = 0.5 * (matrices[self._tails] + matrices[self._heads])
+        pull = self._weights[:, None] * np.einsum("eij,ej->ei", mean, self._edges)
+        moved = x.copy()
+        b = self._summed(pull)[self._free] - self._coupling @ x[self._handles]
+        moved[self._free] = self._factor.solve(b)
+        return moved
+
+    def _energy(self, x: Floats, matrices: Floats) -> float:
+        shaped = np.einsum("eij,ej->ei", matrices[self._tails], self._edges)
+        error = x[self._tails] - x[self._heads] - shaped
+        return float(self._weights @ np.einsum("ei,ei->e", error, error))
+
+
+def volume(vertices: Floats, faces: Ints) -> float:
+    """The volume that a closed surface (N, 3), (F, 3) encloses."""
+    a, b, c = (vertices[faces[:, corner]] - vertices[0] for corner in range(3))
+    return float(np.einsum("fi,fi->", a, np.cross(b, c))) / 6.0
+
+
+def volume_gradient(vertices: Floats, faces: Ints) -> Floats:
+    """How the volume changes with each vertex, (N, 3)."""
+    gradient = np.zeros_like(vertices)
+    corners = [vertices[faces[:, corner]] - vertices[0] for corner in range(3)]
+    for corner in range(3):
+        across = np.cross(corners[(corner + 1) % 3], corners[(corner + 2) % 3])
+        np.add.at(gradient, faces[:, corner], across / 6.0)
+    return gradient
