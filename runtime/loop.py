@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Protocol
 
 from devices.skeleton import SkeletonFrame
 from devices.stream import SkeletonStream
@@ -27,14 +26,6 @@ from runtime.theatre import Theatre
 EARLY = 0.75  # of the wanted step between pictures; frames never come quite evenly
 
 
-class Recorder(Protocol):
-    """Keeps every frame that arrives, in order."""
-
-    def write(self, frame: SkeletonFrame) -> None:
-        """Keep one frame."""
-        ...
-
-
 class FrameLoop:
     """Drives puppets by the newest frame of a stream.
 
@@ -49,7 +40,6 @@ class FrameLoop:
         others: further performers' acts, in the order in which they come; outputs and theatre have
             their puppets after these.
         conditioning: how the stream is put in order; as it comes where None.
-        recorder: what keeps the performer's frames as they come, or None.
         shown: whether somebody looks, so that every tick is drawn.
 
     Attributes:
@@ -70,7 +60,6 @@ class FrameLoop:
         outputs: Sequence[Sequence[Output]],
         others: Sequence[Act] = (),
         conditioning: Conditioning | None = None,
-        recorder: Recorder | None = None,
         shown: bool = False,
     ) -> None:
         self.frames = self.received = 0
@@ -81,7 +70,6 @@ class FrameLoop:
         self._report = report
         self._theatre = theatre
         self._outputs = outputs
-        self._recorder = recorder
         self._shown = shown
         rate = max((o.pictures_a_second for kept in outputs for o in kept), default=0.0)
         self._picture_step = EARLY / rate if rate > 0.0 else math.inf  # [s]
@@ -112,11 +100,8 @@ class FrameLoop:
         return newest is not None
 
     def _receive(self) -> tuple[SkeletonFrame | None, dict[int, SkeletonFrame]]:
-        """The newest frame, and that of each part; the recorder gets every one, as it came."""
+        """The newest frame, and that of each part."""
         came = self._stream.poll()
-        if self._recorder is not None:
-            for frame in came:
-                self._recorder.write(frame)
         frames = self._reception.receive(came)
         parts = {}
         for frame in frames:

@@ -14,6 +14,7 @@ import pytest
 from devices.errors import InputError
 from devices.skeleton import SkeletonFrame
 from replay.player import EveryFrame, Player, RealTime
+from replay.recorded_stream import RecordedStream
 from replay.recording import Recording
 from runtime.conditioning.switches import Conditioning, filled_only, for_live
 from runtime.director import Choices, Director
@@ -108,14 +109,13 @@ def loop_of(  # what every show needs, with what a test cares for
     performer = Performer(BODY)
     hands = [Mapping(ARMS)] * len(puppets)
     return FrameLoop(
-        player,
+        player if recorder is None else RecordedStream(player, recorder.write),
         performer,
         puppets,
         director=Director(performer, puppets, lambda: FRONT_VIEW, Choices(), hands),
         report=report or Report(None),
         theatre=theatre,
         outputs=outputs,
-        recorder=recorder,
         conditioning=conditioning,
         shown=shown,
     )
