@@ -88,10 +88,18 @@ class Theatre:
 
     def show(self, pose: Pose | None, motions: Sequence[Motion]) -> None:
         """Draw the puppets as they are now, and the performer in the mirror."""
+        self.upload(motions)
+        self.draw(pose)
+
+    def upload(self, motions: Sequence[Motion]) -> None:
+        """Give the GPU the puppets as they are now."""
         for actor, puppet, motion in zip(self._actors, self._puppets, motions, strict=True):
             actor.update(motion.vertices)
             chains = puppet.chains if self.highlights else []
             actor.highlight(chains, _colours(len(chains)))
+
+    def draw(self, pose: Pose | None) -> None:
+        """Draw what was uploaded, and the performer in the mirror."""
         if self._inset is not None and pose is not None:
             self._inset.update(
                 pose.seen,

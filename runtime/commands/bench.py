@@ -12,7 +12,7 @@ from devices.errors import InputError
 from runtime.output.whole_file import check_writable, whole_file
 
 NAMES = ("arap", "table1", "hold", "dense", "tick", "match")
-LONG = ("soak", "kill")  # only when named
+LONG = ("soak", "kill", "latency")  # only when named
 
 
 def bench(options: argparse.Namespace) -> int:
@@ -32,12 +32,17 @@ def bench(options: argparse.Namespace) -> int:
 
 
 def _wishes(options: argparse.Namespace) -> dict[str, Any]:
-    """What was asked of the soak, which alone can be asked for more or less."""
-    asked = {"seconds": options.seconds, "real_time": options.real_time or None}
-    wishes = {name: value for name, value in asked.items() if value is not None}
-    if wishes and options.name != "soak":
-        raise InputError("--seconds and --real-time are for `bunraku bench soak`; leave them out")
-    return wishes
+    """What was asked of the one benchmark that can be asked for it."""
+    asked = {
+        "seconds": (options.seconds, "soak"),
+        "real_time": (options.real_time or None, "soak"),
+        "load": (options.load or None, "latency"),
+    }
+    for name, (value, owner) in asked.items():
+        if value is not None and options.name != owner:
+            option = name.replace("_", "-")
+            raise InputError(f"--{option} is for `bunraku bench {owner}`; leave it out")
+    return {name: value for name, (value, _) in asked.items() if value is not None}
 
 
 def _write(path: Path, figures: dict[str, Any]) -> None:

@@ -1,0 +1,295 @@
+"""From a packet to deformed vertices on the GPU: another process sends, the whole loop performs."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
+from urllib.parse import urlsplit
+
+import numpy as np
+from numpy.typing import NDArray
+
+from devices.bridge_stream import BridgeStream
+from devices.bridge_stream import open_device as open_bridge
+from devices.errors import InputError
+from devices.live_stream import LiveStream
+from devices.skeleton import Skeleton, SkeletonFrame
+from devices.udp import UdpTransport
+from devices.vmc import VmcDecoder
+from runtime.characters.builtin import builtin_character
+from runtime.conditioning.switches import for_live
+from runtime.director import Choices, Director
+from runtime.interrupt import held
+from runtime.loop import FrameLoop
+from runtime.output.report import Report
+from runtime.pacing import OnArrival
+from runtime.performer import Performer, Pose
+from runtime.puppet import Motion, Puppet
+from runtime.render.context import headless_context, is_software, release_headless
+from runtime.theatre import Theatre
+
+if TYPE_CHECKING:
+    import moderngl
+
+RATES = (30.0, 60.0, 120.0)
+WAYS = ("zmq", "vmc")
+CHARACTER = "mannequin"
+SIZE = (320, 180)
+WARM_UP = 1.0  # [s] that does not count
+MEASURED = 8.0  # [s] that do
+BUDGET_MS = {"p50": 4.0, "p99": 10.0}
+PATIENCE = 5.0  # [s] without a frame after which no more will come
+_BUSY = "while True: pass"
+
+Array = NDArray[np.float64]
+Live = BridgeStream | LiveStream
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Times:
+    """Host monotonic times [s] of each performed frame, (F,).
+
+    Attributes:
+        sent: just before it left the other process, as far as its time says; VMC's clock is only
+            known from the least delay seen.
+        came: when its last packet was read.
+        uploaded: when its deformed vertices were on the GPU and the GPU was done.
+        drawn: when its picture was, headless in place of the swap; NaN where none was drawn.
+        lost: frames that were sent and never performed, because a newer one was there.
+    """
+
+    sent: Array
+    came: Array
+    uploaded: Array
+    drawn: Array
+    lost: int
+
+
+def run(*, load: bool = False) -> dict[str, object]:
+    """Print and return percentiles [ms] for every way and rate; with `load` also on a busy core."""
+    context = headless_context()
+    software = is_software(context)
+    vertices = len(builtin_character(CHARACTER).vertices)
+    print(
+        f"latency: {CHARACTER}, {vertices} vertices; budget at 60 Hz, packet to vertices: "
+        f"{BUDGET_MS['p50']} ms median, {BUDGET_MS['p99']} ms p99"
+    )
+    print(f"pictures of {SIZE[0]}x{SIZE[1]} drawn by {'a processor' if software else 'a GPU'}")
+    print(
+        f"{'':>22}  packet to vertices    sent to vertices     and drawn: vertices   picture\n"
+        f"{'way':>5} {'Hz':>4} {'beside':>10}    p50   p99   max    p50   p99   max"
+        f"         p50   p99   p50   p99  left out"
+    )
+    figures: dict[str, object] = {}
+    try:
+        for beside in ("nothing", "a busy core") if load else ("nothing",):
+            for way in WAYS:
+                for rate in RATES:
+                    with _busy_core(beside != "nothing"):
+                        plain = measured(context, way, rate, drawn=False)
+                        drawn = measured(context, way, rate, drawn=True)
+                    figures[f"{way}, {rate:.0f} Hz, beside {beside}"] = _told(
+                        f"{way:>5} {rate:>4.0f} {beside:>10}", plain, drawn
+                    )
+    finally:
+        release_headless(context)
+    return {"budget_ms": BUDGET_MS, "vertices": vertices, "software_gl": software, "ms": figures}
+
+
+def measured(
+    context: moderngl.Context, way: str, rate: float, *, drawn: bool, seconds: float = MEASURED
+) -> Times:
+    """Perform what another process sends by one way at one rate, for so long [s].
+
+    Raises:
+        InputError: nothing came in time.
+    """
+    count = round(rate * (WARM_UP + seconds))
+    with ExitStack() as closing:
+        if way == "zmq":
+            sender = closing.enter_context(_sender(way, rate, count))
+            address = f"zmq+{_line(sender)}?mode=lossless"
+            stream: Live = closing.enter_context(open_bridge(urlsplit(address)))
+        else:
+            udp = UdpTransport("127.0.0.1", 0, scheme="vmc")
+            stream = closing.enter_context(LiveStream(udp, VmcDecoder))
+            sender = closing.enter_context(_sender(way, rate, count, str(udp.port)))
+        show = _Show(context, _Noted(stream), drawn=drawn)
+        closing.callback(show.theatre.close)
+        _say(sender, "go")
+        show.perform(count)
+    return show.times(count, skipped=round(rate * WARM_UP))
+
+
+class _Noted:
+    """A live stream that remembers how many frames it gave, and the newest."""
+
+    def __init__(self, stream: Live) -> None:
+        self.stream = stream
+        self.given = 0
+        self.newest: SkeletonFrame | None = None
+
+    @property
+    def skeleton(self) -> Skeleton:
+        return self.stream.skeleton
+
+    @property
+    def ended(self) -> bool:
+        return self.stream.ended
+
+    def poll(self) -> Sequence[SkeletonFrame]:
+        frames = self.stream.poll()
+        self.given += len(frames)
+        self.newest = frames[-1] if frames else self.newest
+        return frames
+
+    def close(self) -> None:
+        self.stream.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
+
+
+class _Stamping(Theatre):
+    """A theatre that says when [s] the GPU had the vertices, and when the picture was there."""
+
+    context: moderngl.Context
+    draws = True
+    uploaded = drawn = float("nan")
+
+    def upload(self, motions: Sequence[Motion]) -> None:
+        super().upload(motions)
+        self.context.finish()
+        self.uploaded = time.monotonic()
+
+    def draw(self, pose: Pose | None) -> None:
+        if self.draws:
+            super().draw(pose)
+            self.context.finish()
+            self.drawn = time.monotonic()
+
+
+class _Show:
+    """A live show of one character, as `bunraku live` has it."""
+
+    def __init__(self, context: moderngl.Context, stream: _Noted, *, drawn: bool) -> None:
+        self._stream = stream
+        self._rows: list[tuple[float, ...]] = []
+        performer = Performer(stream.skeleton, "whole", for_live())
+        puppet = Puppet(builtin_character(CHARACTER))
+        self.theatre = _Stamping(context, SIZE, [puppet], stream.skeleton)
+        self.theatre.context, self.theatre.draws = context, drawn
+        view = self.theatre.camera.view_rotation
+        report = Report(None)
+        self._loop = FrameLoop(
+            stream,
+            performer,
+            [puppet],
+            director=Director(performer, [puppet], lambda: view, Choices(), [None]),
+            report=report,
+            theatre=self.theatre,
+            outputs=[[report.cast(puppet.character)]],
+            conditioning=for_live(),
+            shown=True,
+        )
+
+    def perform(self, count: int) -> None:
+        """Perform until so many frames have come, or none comes any more."""
+        stream, theatre = self._stream, self.theatre
+        pace = OnArrival(stream.stream)
+        heard = time.monotonic()
+        while stream.given < count and time.monotonic() - heard < PATIENCE:
+            pace.wait()
+            with held():
+                performed = self._loop.tick()
+            if performed and stream.newest is not None:
+                heard = time.monotonic()
+                newest = stream.newest
+                stamps = (newest.time, newest.arrival, theatre.uploaded, theatre.drawn)
+                self._rows.append((stream.given, *stamps))
+
+    def times(self, count: int, skipped: int) -> Times:
+        """What was noted of `count` frames, but for the first `skipped`."""
+        rows = np.array([row for row in self._rows if row[0] > skipped])
+        if len(rows) == 0:
+            raise InputError(
+                "none of the benchmark's packets came in time; try again on a machine less busy"
+            )
+        lost = max(count - skipped - len(rows), 0)
+        return Times(rows[:, 1], rows[:, 2], rows[:, 3], rows[:, 4], lost)
+
+
+def _told(what: str, plain: Times, drawn: Times) -> dict[str, object]:
+    """One line, and its figures [ms]."""
+    packet, sent = (_spread(plain.uploaded - since) for since in (plain.came, plain.sent))
+    vertices, picture = (_spread(until - drawn.came) for until in (drawn.uploaded, drawn.drawn))
+    print(
+        what
+        + "".join(f" {one[name]:6.2f}" for one in (packet, sent) for name in ("p50", "p99", "max"))
+        + "     "
+        + "".join(f" {one[name]:6.2f}" for one in (vertices, picture) for name in ("p50", "p99"))
+        + f" {plain.lost:>5} {drawn.lost:>5}",
+        flush=True,
+    )
+    return {
+        "packet_to_vertices": packet,
+        "sent_to_vertices": sent,
+        "drawn_packet_to_vertices": vertices,
+        "drawn_packet_to_picture": picture,
+        "left_out": {"without_pictures": plain.lost, "with_pictures": drawn.lost},
+    }
+
+
+def _spread(seconds: Array) -> dict[str, float]:
+    p50, p99, most = (1e3 * float(value) for value in np.percentile(seconds, (50, 99, 100)))
+    return {"p50": p50, "p99": p99, "max": most}
+
+
+@contextmanager
+def _sender(*arguments: object) -> Iterator[subprocess.Popen[str]]:
+    """The other process, until it is not needed any more."""
+    with subprocess.Popen(
+        [sys.executable, "-m", "runtime.benchmarks.latency_sender", *map(str, arguments)],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    ) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+@contextmanager
+def _busy_core(busy: bool) -> Iterator[None]:
+    """A process beside that never rests."""
+    if not busy:
+        yield
+        return
+    with subprocess.Popen([sys.executable, "-c", _BUSY]) as process:
+        try:
+            yield
+        finally:
+            process.kill()
+
+
+def _line(process: subprocess.Popen[str]) -> str:
+    assert process.stdout is not None
+    line = process.stdout.readline().strip()
+    if not line:
+        raise InputError("the benchmark's other process ended early; is this an installed bunraku?")
+    return line
+
+
+def _say(process: subprocess.Popen[str], line: str) -> None:
+    assert process.stdin is not None
+    process.stdin.write(f"{line}\n")
+    process.stdin.flush()

@@ -1,0 +1,82 @@
+"""The other process of `bunraku bench latency`: a performer who sends at an exact rate.
+
+It prints where it sends from if others must know, begins when it is told a line, and stays until
+its input is closed. Frames carry the host monotonic time just before they went out.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+
+import numpy as np
+
+from devices.acts import performance
+from devices.performance import RATE, Performance
+from devices.skeleton import SkeletonFrame
+from runtime.clock import Ticker
+from runtime.output.bridge_publisher import BridgePublisher, binding
+from runtime.output.output import PerformedFrame
+from runtime.output.vmc_performer import VmcPerformer
+from runtime.performer import Performer
+
+ACT = "walk"
+_NOTHING = np.zeros((0, 3))
+
+Send = Callable[[SkeletonFrame], None]
+
+
+def main(arguments: list[str]) -> None:
+    """Send COUNT frames at RATE a second by WAY: ``zmq``, or ``vmc`` to PORT."""
+    way, rate, count = arguments[0], float(arguments[1]), int(arguments[2])
+    played = performance(ACT)
+    with ExitStack() as closing:
+        send = (
+            _by_bridge(played, closing)
+            if way == "zmq"
+            else _by_vmc(played, int(arguments[3]), closing)
+        )
+        sys.stdin.readline()
+        _send_all(played, send, rate, count)
+        sys.stdin.read()
+
+
+def _send_all(played: Performance, send: Send, rate: float, count: int) -> None:
+    """Send `count` frames; the performance goes by as fast at every rate."""
+    ticker = Ticker(rate)
+    for number in range(count):
+        ticker.wait()
+        at = round(number * RATE / rate) % len(played.times)
+        send(
+            SkeletonFrame(
+                time=time.monotonic(),
+                positions=played.positions[at],
+                rotations=played.rotations[at],
+                confidence=np.ones(len(played.skeleton.names)),
+            )
+        )
+
+
+def _by_bridge(played: Performance, closing: ExitStack) -> Send:
+    where = binding("tcp://127.0.0.1:*", None, option="keys")
+    publisher = BridgePublisher(where, played.skeleton, tell=lambda _: None)
+    closing.enter_context(publisher)
+    print(publisher.endpoint, flush=True)
+    return publisher.write
+
+
+def _by_vmc(played: Performance, port: int, closing: ExitStack) -> Send:
+    performer = Performer(played.skeleton)
+    sender = closing.enter_context(VmcPerformer(performer, "127.0.0.1", port))
+
+    def send(frame: SkeletonFrame) -> None:
+        performer.follow(frame)
+        sender.write(PerformedFrame(0, frame.time, _NOTHING, _NOTHING, np.zeros((0, 4))))
+
+    return send
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])
