@@ -125,7 +125,12 @@ def test_the_layout_is_the_one_that_is_documented() -> None:
     fields = struct.pack("<QQdIHB", 5, 6, 1.5, 7, 1, 1)
     numbers = struct.pack("<8d", 0.1, 0.2, 0.3, 0.9, 0.0, 0.0, 0.0, 1.0)
     heard = sample_of(head + fields + numbers)
-    assert (heard.session, heard.sequence, heard.frame.time, heard.frame.performer) == (5, 6, 1.5, 7)
+    assert (heard.session, heard.sequence, heard.frame.time, heard.frame.performer) == (
+        5,
+        6,
+        1.5,
+        7,
+    )
     np.testing.assert_array_equal(heard.frame.positions, [[0.1, 0.2, 0.3]])
     np.testing.assert_array_equal(heard.frame.confidence, [0.9])
     np.testing.assert_array_equal(heard.frame.rotations, [[0.0, 0.0, 0.0, 1.0]])
