@@ -9,6 +9,8 @@ from runtime.conditioning.identities import Identities
 from runtime.conditioning.switches import Conditioning
 from runtime.conditioning.timeline import Timeline
 
+MOST_AT_ONCE = 128  # frames of one poll that are looked at, the newest; a flood brings thousands
+
 
 class Reception:
     """Lets frames in that come in order, each under its performer's own number.
@@ -27,7 +29,8 @@ class Reception:
         self._identities = Identities(skeleton)
 
     def receive(self, frames: Sequence[SkeletonFrame]) -> Sequence[SkeletonFrame]:
-        """Those of the frames that are let in, oldest first."""
+        """Those of the frames, and of the newest only, that are let in; oldest first."""
+        frames = frames[-MOST_AT_ONCE:]
         if self._switches.order:
             admitted = (self.timeline.admit(frame) for frame in frames)
             frames = [frame for frame in admitted if frame is not None]

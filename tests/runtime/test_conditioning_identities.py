@@ -9,6 +9,8 @@ from hypothesis import strategies as st
 
 from devices.skeleton import SkeletonFrame
 from runtime.conditioning.identities import MEMORY, Identities
+from runtime.conditioning.reception import MOST_AT_ONCE, Reception
+from runtime.conditioning.switches import for_live
 from tests.runtime.figures import BODY, T_POSE, pose
 
 STEP = 1 / 30
@@ -122,3 +124,12 @@ def test_huge_numbers_become_small_ones_and_few_are_remembered() -> None:
         (number,) = numbers(identities, at(index * 0.01, 10.0 * index, 2**60 + index))
         assert 0 <= number <= 64
     assert len(identities._tracks) <= 65
+
+
+def test_of_a_flood_only_the_newest_are_looked_at() -> None:
+    reception = Reception(BODY, for_live())
+    flood = [at(index * 1e-5, 0.0, 3) for index in range(4096)]
+    let_in = reception.receive(flood)
+    assert len(let_in) == MOST_AT_ONCE
+    assert let_in[-1] is flood[-1]
+    assert reception.receive(flood[-1:]) == [], "and that was a duplicate"
