@@ -27,7 +27,6 @@ from runtime.puppet import Puppet
 from runtime.rehearsal import rehearse
 from runtime.render.camera import front_camera
 from solvers.arap import ArapSolver
-from solvers.binding import bind
 from solvers.decimation import decimate
 from solvers.edges import unique_edges
 
@@ -154,12 +153,13 @@ def measure(
 
 def _perform(character: Character, proxy: Proxy, recording: Recording, frames: int) -> _Handles:
     """Let a puppet of the proxy perform, and note where its handles go."""
-    coarse = replace(character, vertices=proxy.vertices, faces=proxy.faces, weights=proxy.weights)
+    weights = None if character.weights is None else character.weights[proxy.kept]
+    coarse = replace(character, vertices=proxy.vertices, faces=proxy.faces, weights=weights)
     puppet = Puppet(coarse)
     performer, camera = Performer(recording.skeleton), front_camera()
     director = Director(performer, [puppet], lambda: camera.view_rotation, Choices(), [None])
     rehearse(recording, "whole", director)
-    binding = bind(proxy.vertices, proxy.faces, puppet.tree.parents, puppet.tree.positions)
+    binding = puppet.binding
     targets = []
     for index in range(0, len(recording), STEP)[:frames]:
         puppet.follow(performer.follow(recording.frame(index)))

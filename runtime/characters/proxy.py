@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 from runtime.character import Character
 from solvers.decimation import decimate
@@ -27,7 +26,6 @@ class Proxy:
     Attributes:
         vertices: (C, 3) [m] at rest, some of the character's, or all of them.
         faces: (F', 3).
-        weights: (C, K) skin weights of the file's rig, or None.
         kept: (C,) which of the character's vertices they are.
         surface: what lets the others follow; None where there are no others.
         notes: why a dense character is deformed in full, if it is, one short line each.
@@ -35,7 +33,6 @@ class Proxy:
 
     vertices: Array
     faces: Indices
-    weights: csr_array | None
     kept: Indices
     surface: DenseSurface | None = None
     notes: tuple[str, ...] = ()
@@ -67,19 +64,14 @@ def proxy_of(character: Character, *, dense: int = DENSE, count: int = PROXY) ->
         return _whole(character, _too_torn(character, len(coarse.kept)))
     vertices = np.ascontiguousarray(character.vertices[coarse.kept])
     places = embed(character.vertices, coarse.cluster, vertices, coarse.faces)
-    return Proxy(
-        vertices=vertices,
-        faces=coarse.faces,
-        weights=None if character.weights is None else character.weights[coarse.kept],
-        kept=coarse.kept,
-        surface=DenseSurface(places, vertices, coarse.faces),
-        _out=np.empty_like(character.vertices),
-    )
+    surface, out = DenseSurface(places, vertices, coarse.faces), np.empty_like(character.vertices)
+    surface.follow(vertices, out)  # compiles now, or loads what an earlier run compiled
+    return Proxy(vertices, coarse.faces, coarse.kept, surface, _out=out)
 
 
 def _whole(character: Character, *notes: str) -> Proxy:
     everything = np.arange(len(character.vertices))
-    return Proxy(character.vertices, character.faces, character.weights, everything, notes=notes)
+    return Proxy(character.vertices, character.faces, everything, notes=notes)
 
 
 def _too_torn(character: Character, kept: int) -> str:

@@ -14,6 +14,7 @@ from devices.errors import InputError
 from replay.builtin import builtin_recording
 from replay.player import EveryFrame, Player
 from runtime.characters.builtin import BUILTIN, builtin_character
+from runtime.characters.proxy import proxy_of
 from runtime.characters.cache import cache_folder
 from runtime.director import Choices, Director
 from runtime.loop import FrameLoop
@@ -113,6 +114,7 @@ def _warm() -> None:
     recording = builtin_recording()
     performer = Performer(recording.skeleton)
     puppets = [Puppet(builtin_character(name)) for name in BUILTIN]
+    proxy_of(puppets[0].character, dense=0, count=1_000)  # as for a dense character
     context = headless_context()
     theatre = Theatre(context, (320, 180), puppets, recording.skeleton)
     report = Report(None)
