@@ -92,13 +92,14 @@ def test_two_who_come_back_at_once_are_told_apart_together() -> None:
     assert numbers(identities, at(1.5, 0.4, 11), at(1.5, 1.0, 12)) == [1, 2]
 
 
-def test_a_walk_goes_on_while_nobody_sees_it() -> None:
-    identities = Identities(BODY)
+def test_two_who_pass_each_other_while_nobody_sees_them_are_told_apart() -> None:
+    identities, end = Identities(BODY), 29 * STEP
     for index in range(30):
-        x = 1.5 * index * STEP
-        numbers(identities, at(index * STEP, x, 1), at(index * STEP, 1.9, 2))
-    time = 29 * STEP + 0.25
-    assert numbers(identities, at(time, 1.83, 7), at(time, 1.9, 2)) == [1, 2]
+        time = index * STEP
+        way = 1.5 * (time - end)
+        numbers(identities, at(time, 0.4 + way, 1), at(time, 0.6 - way, 2))
+    back = end + 0.3
+    assert numbers(identities, at(back, 0.85, 7), at(back, 0.15, 8)) == [1, 2]
 
 
 @settings(max_examples=40, deadline=None)
