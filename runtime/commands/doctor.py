@@ -14,8 +14,8 @@ from devices.errors import InputError
 from replay.builtin import builtin_recording
 from replay.player import EveryFrame, Player
 from runtime.characters.builtin import BUILTIN, builtin_character
-from runtime.characters.proxy import proxy_of
 from runtime.characters.cache import cache_folder
+from runtime.characters.proxy import proxy_of
 from runtime.director import Choices, Director
 from runtime.loop import FrameLoop
 from runtime.output.report import Report
