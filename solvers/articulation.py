@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.spatial import KDTree
 
 from solvers.edges import unique_edges
 from solvers.limbs import closest_bones, limbs
@@ -225,16 +226,9 @@ def _rigidity(region_of: Indices, radii: Array, graph: csr_array, vertices: Arra
     share = np.ones(len(region_of))
     for radius in np.unique(reach):
         border = np.unique(tails[reach == radius])
-        far, _, source = dijkstra(
-            graph,
-            directed=False,
-            indices=border,
-            min_only=True,
-            limit=DETOUR * radius,
-            return_predecessors=True,
-        )
+        far = dijkstra(graph, directed=False, indices=border, min_only=True, limit=DETOUR * radius)
         near = np.flatnonzero(np.isfinite(far))
-        gap = np.linalg.norm(vertices[near] - vertices[source[near]], axis=1)
+        gap = KDTree(vertices[border]).query(vertices[near])[0]
         share[near] = np.minimum(share[near], gap / max(radius, 1e-300))
     smooth: Array = share * share * (3.0 - 2.0 * share)
     return smooth
