@@ -26,6 +26,8 @@ Array = NDArray[np.float64]
 
 BOTH = "both"
 SAME_HAND_MM = 150.0  # a hand that comes back nearer than this to where it was lost is the same
+INFERRED = 0.5  # how sure a joint is that is put where it is likely, as Kinects have it
+_ARM_MM = (("wrist", 65.0), ("elbow", 250.0))  # from the palm to the wrist, and on to the elbow
 _TURN = 1e3 * LEAP_TO_WORLD  # device axes to ours, without the unit
 
 
@@ -100,7 +102,8 @@ class LeapPerformer:
     def frame(self, hands: Sequence[Hand], time: float, arrival: float) -> SkeletonFrame:
         """The frame [s] of one message's hands; a message without hands is one with no joint seen.
 
-        Tips that no protocol names get their fingers by where they are.
+        Tips that no protocol names get their fingers by where they are. Where a server tells of no
+        arm, as older ones, wrist and elbow are put behind the palm, half as sure as it.
         """
         joints = len(self.skeleton.names)
         positions, bases = np.full((joints, 3), np.nan), np.full((joints, 3, 3), np.nan)
@@ -110,6 +113,9 @@ class LeapPerformer:
                 continue
             self._name_tips(side, hand)
             columns = self._columns[side]
+            for name, place in _likely_arm(hand).items():
+                positions[columns[name]] = place
+                confidence[columns[name]] = INFERRED * hand.confidence
             for name, place in hand.joints.items():
                 positions[columns[name]] = place
                 confidence[columns[name]] = hand.confidence
@@ -141,6 +147,18 @@ class LeapPerformer:
         self._fingers[side] = {
             tip.id: by_place[id(tip.place)] for tip in hand.tips if id(tip.place) in by_place
         }
+
+
+def _likely_arm(hand: Hand) -> dict[str, Array]:
+    """Wrist and elbow [mm] of a hand without an arm: straight behind its palm."""
+    length = float(np.linalg.norm(hand.direction))
+    if "wrist" in hand.joints or "elbow" in hand.joints or not 0.5 < length < 2.0:
+        return {}
+    along, places, place = hand.direction / length, {}, hand.joints[PALM]
+    for name, bone in _ARM_MM:
+        place = place - bone * along
+        places[name] = place
+    return places
 
 
 def _rotations(bases: Array) -> Array:

@@ -194,6 +194,20 @@ def test_a_header_of_an_older_protocol_and_its_frames_are_taken() -> None:
             np.testing.assert_allclose(place(decoder, frame, f"right_{name}_tip"), tip)
 
 
+def test_an_arm_that_is_not_told_is_put_behind_the_palm_and_less_sure() -> None:
+    decoder = LeapDecoder()
+    bare = hand(2, "right", 80.0)
+    del bare["wrist"], bare["elbow"]
+    frame = feed(decoder, message(0, [bare], fingers(2, 80.0)))
+    for name, z in (("wrist", 115.0), ("elbow", 365.0)):
+        expected = leap_to_world([80, 200, z])
+        np.testing.assert_allclose(place(decoder, frame, f"right_{name}"), expected)
+        assert frame.confidence[decoder.skeleton.index(f"right_{name}")] == 0.375
+    bare["direction"] = [0.0, 0.0, 0.0]
+    frame = feed(decoder, message(1, [bare], fingers(2, 80.0)))
+    assert np.isnan(place(decoder, frame, "right_wrist")).all()
+
+
 def device_event(attached: bool, streaming: bool, name: str = "L1") -> bytes:
     state = {"attached": attached, "streaming": streaming, "id": name, "type": "peripheral"}
     return json.dumps({"event": {"type": "deviceEvent", "state": state}}).encode()
