@@ -10,6 +10,7 @@ from PIL import Image, ImageDraw, ImageFont
 from scipy.spatial.transform import Rotation
 
 from runtime.figures.plain import PlainSolver
+from runtime.figures.revolved import revolved
 from solvers.arap import ArapSolver
 from solvers.laplacian import Floats, Ints
 from solvers.squash_stretch import SquashStretchSolver
@@ -18,7 +19,7 @@ FRAMES = 60
 SHARES = (0.30, 0.20, 0.10, 0.05)
 
 _FINER = 2  # drawn this much larger, for smooth edges
-_SETTLED = 400  # iterations after which the plain equations count as settled
+_SETTLED = 200  # iterations after which the plain equations count as settled
 _INK, _PAPER, _GRID = (58, 48, 40), (250, 246, 238), (226, 218, 204)
 _COLOURS = {
     "ARAP, plain": (196, 178, 150),
@@ -47,7 +48,7 @@ class Curves:
 
 def measure() -> list[Curves]:
     """The curves of four constraints on a round bar with patches at both ends."""
-    vertices, faces = _bar()
+    vertices, faces = revolved(np.linspace(0.0, 4.0, 36), np.full(36, 0.5), 16)
     x = vertices[:, 0]
     handles = np.flatnonzero((x < 0.3) | (x > 3.7))
     right = (x[handles] > 2.0)[:, None]
@@ -100,26 +101,6 @@ def _plain_energies(
     return np.array([*energies, energy(x)])
 
 
-def _bar(rings: int = 36, around: int = 16) -> tuple[Floats, Ints]:
-    """A closed round bar along x, of length 4 and radius 0.5."""
-    x = np.linspace(0.0, 4.0, rings)
-    angle = 2 * np.pi * (np.arange(around) + 0.5 * (np.arange(rings)[:, None] % 2)) / around
-    long = np.broadcast_to(x[:, None], angle.shape)
-    tube = np.stack([long, 0.5 * np.cos(angle), 0.5 * np.sin(angle)], axis=-1).reshape(-1, 3)
-    i, k = (index.ravel() for index in np.mgrid[: rings - 1, :around])
-    a, b = i * around + k, i * around + (k + 1) % around
-    c, d = a + around, b + around
-    odd = (i % 2 == 1)[:, None]
-    first = np.where(odd, np.stack([a, b, d], 1), np.stack([a, b, c], 1))
-    second = np.where(odd, np.stack([a, d, c], 1), np.stack([b, d, c], 1))
-    k, last = np.arange(around), len(tube)
-    start = np.stack([np.full(around, last), (k + 1) % around, k], axis=1)
-    end = np.stack([np.full(around, last + 1), k, (k + 1) % around], axis=1)
-    end[:, 1:] += last - around
-    vertices = np.vstack([tube, [-0.1, 0.0, 0.0], [4.1, 0.0, 0.0]])
-    return vertices, np.concatenate([first, second, start, end]).astype(np.int64)
-
-
 def draw(curves: list[Curves], size: tuple[int, int]) -> Image.Image:
     """The curves as a picture: a panel for each constraint, two to a row, a legend below."""
     width, height = _FINER * size[0], _FINER * size[1]
@@ -130,7 +111,7 @@ def draw(curves: list[Curves], size: tuple[int, int]) -> Image.Image:
     for index, curve in enumerate(curves):
         left, top = (index % 2) * width // 2, index // 2 * (height - legend) // rows
         _draw_panel(pen, curve, (left, top, left + width // 2, top + (height - legend) // rows))
-    font = ImageFont.load_default(max(height // 40, 8))
+    font = ImageFont.load_default(max(height // 46, 8))
     for index, method in enumerate(_COLOURS):
         x = width // 20 + index * width // 4
         y = height - legend // 2

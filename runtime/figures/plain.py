@@ -11,6 +11,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 import scipy.sparse.linalg as spla
+from scipy.sparse.csgraph import connected_components
 
 from solvers.laplacian import Floats, Ints, cotangent_edges, graph_laplacian
 
@@ -29,7 +30,11 @@ class PlainSolver:
         slots = np.arange(len(self._tails))
         self._sum = sp.csr_matrix((np.ones(len(slots)), (self._tails, slots)), (count, len(slots)))
         laplacian = graph_laplacian(edges, count)
-        self._free = np.setdiff1d(np.arange(count), handles)
+        # A component without a handle is nobody's to move, and stays at rest.
+        _, part_of = connected_components(laplacian, directed=False)
+        is_free = np.isin(part_of, part_of[handles])
+        is_free[handles] = False
+        self._free = np.flatnonzero(is_free)
         self._coupling = laplacian[self._free][:, handles]
         self._factor = spla.splu(sp.csc_matrix(laplacian[self._free][:, self._free]))
         self._volume = volume(vertices, faces)
@@ -65,6 +70,8 @@ class PlainSolver:
         for _ in range(8):
             moved = x + multiplier * push
             slope = float((volume_gradient(moved, self._faces) * push).sum())
+            if not slope > 0.0:  # a sheet has no volume to keep
+                break
             multiplier -= (volume(moved, self._faces) - self._volume) / slope
         return x + multiplier * push
 
