@@ -67,6 +67,11 @@ def share(text: str) -> float:
     return _between(text, 0.0, 1.0)
 
 
+def stiffness(text: str) -> float:
+    """A number from 0 to 0.99."""
+    return _between(text, 0.0, 0.99)
+
+
 def gain(text: str) -> float:
     """A number from 0 to 10."""
     return _between(text, 0.0, 10.0)
@@ -150,20 +155,36 @@ def _add_show_options(parser: argparse.ArgumentParser) -> None:
         metavar="N",
         help="ARAP iterations a frame (default 2)",
     )
-    made = parser.add_argument_group("what characters are made of")
+    made = parser.add_argument_group(
+        "what characters are made of",
+        "each may be repeated: the first is for the first character, the last for all that follow",
+    )
     made.add_argument(
         "--cartoon",
+        action="append",
         type=share,
-        default=0.0,
         metavar="X",
         help="0 (default) keeps every part rigid, 1 lets it squash and stretch with its motion",
     )
     made.add_argument(
         "--volume-gain",
+        action="append",
         type=gain,
-        default=1.0,
         metavar="X",
         help="how much of the volume is kept when it does; more than 1 exaggerates (default 1)",
+    )
+    made.add_argument(
+        "--stiffness",
+        action="append",
+        type=stiffness,
+        metavar="X",
+        help="0 (default) lets limbs bend all along, towards 1 they bend at their joints only",
+    )
+    made.add_argument(
+        "--energy",
+        action="append",
+        choices=("spokes", "spokes-and-rims", "smooth-rotations"),
+        help="what is kept as rigid as possible (default spokes)",
     )
     keep = parser.add_argument_group("what is kept")
     keep.add_argument("--video", type=Path, metavar="OUT.mp4")

@@ -17,6 +17,7 @@ from runtime.mapping import Drive, Mapping
 from runtime.performer import Pose, Rest
 from runtime.skin import Anchors, Skin
 from solvers.abstraction import abstract
+from solvers.arap_cells import SPOKES
 from solvers.handles import HARD
 from solvers.heading import turn_about, turned
 from solvers.polyline_motion import ChainRetarget
@@ -69,7 +70,8 @@ class Puppet:
 
     Args:
         character: who performs.
-        iterations: ARAP iterations a frame.
+        iterations: of the solver, a frame.
+        energy: what is kept as rigid as possible: see `ArapSolver`.
 
     Attributes:
         tree: the character's nodes, hung on `root`.
@@ -80,14 +82,14 @@ class Puppet:
         gains: for each drive the share of the performer's turns that is carried over, in (0, 1].
     """
 
-    def __init__(self, character: Character, *, iterations: int = 2) -> None:
+    def __init__(self, character: Character, *, iterations: int = 2, energy: str = SPOKES) -> None:
         self.character = character
         self.iterations = iterations
         skeleton = character.skeleton
         tree = Tree(skeleton.parents, skeleton.rest_positions)
         self.root = abstract(tree).root
         self.tree = tree.rerooted(self.root)
-        self.skin = Skin(character, self.tree)
+        self.skin = Skin(character, self.tree, energy=energy)
         self.binding = self.skin.binding
         self._standing = [np.empty_like(character.vertices) for _ in range(2)]
         self.mapping = Mapping(())

@@ -10,6 +10,8 @@ from scipy.spatial.transform import Rotation
 
 from runtime.character import Character
 from runtime.characters.proxy import proxy_of
+from solvers.arap_cells import SPOKES
+from solvers.articulation import articulate
 from solvers.binding import bind
 from solvers.edges import unique_edges
 from solvers.handles import HARD, group_targets
@@ -28,10 +30,12 @@ class Elasticity:
         cartoon: 0 keeps every part rigid, 1 lets it squash and stretch.
         volume_gain: how much of the volume that squash and stretch would cost is kept; more than
             1 exaggerates.
+        stiffness: 0 lets limbs bend all along, towards 1 they bend at their joints only.
     """
 
     cartoon: float = 0.0
     volume_gain: float = 1.0
+    stiffness: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -59,6 +63,7 @@ class Skin:
     Args:
         character: whose surface.
         tree: its nodes, hung on the one that holds it.
+        energy: what is kept as rigid as possible, as of `ArapSolver`.
 
     Attributes:
         rest: (C, 3) [m] the surface that is deformed, at rest.
@@ -67,24 +72,28 @@ class Skin:
         notes: what the user should know about it, one short line each.
     """
 
-    def __init__(self, character: Character, tree: Tree) -> None:
+    def __init__(self, character: Character, tree: Tree, *, energy: str = SPOKES) -> None:
         self._proxy = proxy = proxy_of(character)
         self.rest = proxy.vertices
         self.edges = unique_edges(proxy.vertices, proxy.faces)
         self.notes = proxy.notes
         ends = self.rest[self.edges]
         self._rest_lengths = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
+        bone_of_vertex = _bones_of_weights(character, proxy.kept, tree.parents)
         self.binding = bind(
-            proxy.vertices,
-            proxy.faces,
-            tree.parents,
-            tree.positions,
-            _bones_of_weights(character, proxy.kept, tree.parents),
+            proxy.vertices, proxy.faces, tree.parents, tree.positions, bone_of_vertex
         )
         handles, self._group = self.binding.handles, self.binding.anchor
         self._solver = SquashStretchSolver(
-            proxy.vertices, proxy.faces, handles, groups=self._group, cartoon=0.0
+            proxy.vertices,
+            proxy.faces,
+            handles,
+            energy=energy,
+            groups=self._group,
+            cartoon=0.0,
         )
+        self._tree, self._bone_of_vertex = tree, bone_of_vertex
+        self._is_articulated = False
         self._offsets = self.rest[handles] - tree.positions[self.binding.pivot[self._group]]
         bones = tree.positions[self.binding.node] - tree.positions[self.binding.pivot]
         long = np.linalg.norm(bones, axis=1, keepdims=True)
@@ -102,7 +111,24 @@ class Skin:
     def elasticity(self, elasticity: Elasticity) -> None:
         self._solver.cartoon = elasticity.cartoon
         self._solver.volume_gain = elasticity.volume_gain
+        if elasticity.stiffness > 0.0 and not self._is_articulated:
+            self._articulate()
+        self._solver.stiffness = elasticity.stiffness
         self._elasticity = elasticity
+
+    def _articulate(self) -> None:
+        """Find the parts that may be stiff; it takes a few frames' time, once."""
+        tree, proxy = self._tree, self._proxy
+        parts = articulate(
+            proxy.vertices,
+            proxy.faces,
+            tree.parents,
+            tree.positions,
+            self.binding.inside,
+            self._bone_of_vertex,
+        )
+        self._solver.stiffen(parts.region_of, parts.rigidity)
+        self._is_articulated = True
 
     @property
     def energy(self) -> float:

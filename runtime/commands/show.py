@@ -9,6 +9,7 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from replay.recorded_stream import RecordedStream
 from replay.recorder import Recorder
 from replay.recording import Recording
 from runtime.cast import character_named
+from runtime.character import Character
 from runtime.characters.builtin import BUILTIN
 from runtime.commands.outputs import check_outputs, open_outputs
 from runtime.conditioning.switches import asked_for, for_live, for_recording
@@ -44,6 +46,7 @@ from runtime.skin import Elasticity
 from runtime.theatre import Theatre
 from runtime.warn import warn
 from runtime.window import Window
+from solvers.arap_cells import SPOKES
 
 STEADY = 1.0  # seconds that a live match stands before it performs by itself
 
@@ -112,6 +115,21 @@ def _show(options: argparse.Namespace, open_source: Callable[[], _Source]) -> in
     return 0
 
 
+def _made(character: Character, number: int, options: argparse.Namespace) -> Puppet:
+    """The puppet of the `number`-th character, of what was asked for it."""
+
+    def asked(values: list[Any] | None, otherwise: Any) -> Any:
+        return values[min(number, len(values) - 1)] if values else otherwise
+
+    puppet = Puppet(character, iterations=options.iterations, energy=asked(options.energy, SPOKES))
+    puppet.skin.elasticity = Elasticity(
+        cartoon=asked(options.cartoon, 0.0),
+        volume_gain=asked(options.volume_gain, 1.0),
+        stiffness=asked(options.stiffness, 0.0),
+    )
+    return puppet
+
+
 class _Show:
     """One show as the command line asked for it; what it opens is left to `closing`."""
 
@@ -126,9 +144,7 @@ class _Show:
         characters = [character_named(name) for name in options.character]
         self._report = Report(options.report)
         self._parts = [self._report.cast(character) for character in characters]
-        self._puppets = [Puppet(one, iterations=options.iterations) for one in characters]
-        for puppet in self._puppets:
-            puppet.skin.elasticity = Elasticity(options.cartoon, options.volume_gain)
+        self._puppets = [_made(one, number, options) for number, one in enumerate(characters)]
         self._window = None
         if not options.headless:
             self._window = closing.enter_context(Window("Bunraku", options.size))
