@@ -14,6 +14,7 @@ from runtime.character import Character
 from runtime.output.output import PerformedFrame
 from runtime.output.stage_times import StageTimes
 from runtime.output.stretch import StretchStatistic
+from runtime.output.watchdog import Watchdog
 from runtime.output.whole_file import check_writable, whole_file
 
 
@@ -45,6 +46,7 @@ class Part:
         self.frames = 0
         self._character = character
         self._stretch = StretchStatistic(character.vertices, character.faces)
+        self._watchdog = Watchdog(character.vertices, character.faces)
         self._score: float | None = None
         self._pairs: tuple[MatchedPair, ...] = ()
 
@@ -59,6 +61,7 @@ class Part:
     def write(self, frame: PerformedFrame) -> None:
         """Count one performed frame."""
         self._stretch.add(frame.vertices)
+        self._watchdog.add(frame.vertices)
         self.frames += 1
 
     def close(self) -> None:
@@ -71,7 +74,7 @@ class Part:
         self.close()
 
     def summary(self) -> dict[str, Any]:
-        """The parts ``character``, ``match`` and ``stretch`` of the report."""
+        """The parts ``character``, ``match``, ``stretch`` and ``watchdog`` of the report."""
         body = self._character
         return {
             "character": {
@@ -87,6 +90,7 @@ class Part:
                 ],
             },
             "stretch": {"mean": self._stretch.mean, "p99": self._stretch.p99},
+            "watchdog": self._watchdog.summary(),
         }
 
 
@@ -97,9 +101,11 @@ class Report:
     lost, fault} of the recording that was made, or null, ``character``
     {vertices, faces, nodes}, ``match`` {score, pairs: [{source: [joint names], target: [node
     ids]}]}, ``stages_ms`` {poll, match, retarget, deform, render, publish, frame: {p50, p99, max}},
-    ``stretch`` {mean, p99}. With several characters ``character``, ``match`` and ``stretch`` are
-    those of the first, and ``characters`` lists them for each, with its ``name``. A value that is
-    not a finite number is written as null: the file is JSON by the letter of RFC 8259.
+    ``stretch`` {mean, p99}, ``watchdog`` {energy {p50, max}, stretch {p99, max}, inverted {max,
+    last, longest, frames}}. With several characters ``character``, ``match``, ``stretch`` and
+    ``watchdog`` are those of the first, and ``characters`` lists them for each, with its ``name``.
+    A value that is not a finite number is written as null: the file is JSON by the letter of
+    RFC 8259.
 
     Attributes:
         times: where the loop notes how long its stages take.

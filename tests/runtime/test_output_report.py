@@ -34,6 +34,10 @@ def test_the_report_has_the_keys_that_others_read(tmp_path: Path) -> None:
     assert stages["render"] == {"p50": 0.0, "p99": 0.0, "max": 0.0}
     stretch = written.pop("stretch")
     assert 0 < stretch["mean"] < stretch["p99"] < 0.2
+    watchdog = written.pop("watchdog")
+    assert 0 < watchdog["energy"]["p50"] <= watchdog["energy"]["max"] < 0.01
+    assert 0 < watchdog["stretch"]["p99"] <= watchdog["stretch"]["max"] < 0.2
+    assert watchdog["inverted"] == {"max": 0, "last": 0, "longest": 0, "frames": 0}
     assert written == {
         "frames": 7,
         "dropped": 2,
