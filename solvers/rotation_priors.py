@@ -5,8 +5,8 @@ M the mass of a cell at rest (its edges' w |e|^2), A the surface's area, w the e
 
 - smooth rotations, a A sum over half-edges (k, l) of w |R_k - R_l|^2: bending spreads evenly,
   however fine the mesh and however few the handles (Levi and Gotsman 2015, Smooth rotation enhanced
-  as-rigid-as-possible mesh animation, eq. (5));
-- articulated stiffness, s / (1 - s) sum over cells of M_k r_k |R_k - Q_region(k)|^2: every region
+  as-rigid-as-possible mesh animation);
+- articulated stiffness, c s / (1 - s) sum over cells of M_k r_k |R_k - Q_region(k)|^2: every region
   has a rotation Q of its own, which its cells keep to where their rigidity r is one, so that limbs
   stay straight and joints bend (Celikcan et al. 2015, section 8, name it as future work).
 
@@ -17,7 +17,7 @@ covariance S_k alone, with a prior P_k, and no matrix changes. No local step can
   that mean at the last rotations every cell can be fitted by itself, all of them at once;
 - a region's Q is the one nearest to its cells' rotations, as they are;
 - after the fit every region turns as a whole, its cells and its Q alike, by what is best for it:
-  cells alone, each held back by Q, would take 1 / (1 - s) steps to turn as all of them want to.
+  cells alone, each held back by Q, would take ever more steps to turn as all of them want to.
 
 Rotations that depend on each other must start where the last frame's ended. They move along with
 the handles just as positions do.
@@ -39,6 +39,7 @@ from solvers.laplacian import Floats, Ints
 from solvers.rotation_fit import LANES, SCRATCH, fit_rotations
 
 SMOOTHNESS = 0.02  # Levi and Gotsman's alpha
+HALF = 0.05  # c: stiffness 1/2 about halves what a limb bends between its joints (measured)
 
 _R = 9 * LANES
 
@@ -147,7 +148,7 @@ class RotationPriors:
 
     @property
     def _kappa(self) -> float:
-        return self.stiffness / (1.0 - self.stiffness)
+        return HALF * self.stiffness / (1.0 - self.stiffness)
 
 
 def _masses(cells: Cells, rest: Floats) -> Floats:

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from solvers.arap import ArapSolver
 from solvers.arap_cells import SPOKES, SPOKES_AND_RIMS, build_cells
-from solvers.rotation_priors import RotationPriors
+from solvers.rotation_priors import HALF, RotationPriors
 from tests.solvers.test_arap import bar, bent, ends
 
 
@@ -91,7 +91,7 @@ def test_the_terms_are_those_of_the_papers(name: str) -> None:
     priors = RotationPriors(mesh, vertices, 0.0)
     priors.stiffen(region_of, rigidity)
     priors.stiffness = 0.75
-    assert priors.energy(R.reshape(-1, 9)) == pytest.approx(3.0 * stiff)
+    assert priors.energy(R.reshape(-1, 9)) == pytest.approx(HALF * 3.0 * stiff)
 
 
 def test_no_stiffness_is_plain_arap_to_the_last_bit() -> None:
@@ -117,7 +117,7 @@ def test_stiff_limbs_stay_straight_and_the_joint_bends() -> None:
 
     bending = [spread(stiffness) for stiffness in (0.0, 0.5, 0.95)]
     assert bending[0] > 0.09  # the plain bar bends all along
-    assert bending[1] < 0.7 * bending[0]
+    assert 0.3 * bending[0] < bending[1] < 0.8 * bending[0]
     assert bending[2] < 0.2 * bending[0]
 
 
