@@ -7,6 +7,7 @@ import importlib
 import io
 import math
 import os
+import string
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -89,6 +90,19 @@ def _between(text: str, least: float, most: float) -> float:
     return value
 
 
+def colour(text: str) -> tuple[int, int, int]:
+    """Red, green and blue in sRGB bytes, from ``#rrggbb``, ``#rgb`` or ``chroma``."""
+    if text.lower() == "chroma":
+        return 0, 255, 0
+    digits = text.removeprefix("#")
+    if len(digits) == 3:
+        digits = "".join(2 * digit for digit in digits)
+    if len(digits) != 6 or not set(digits) <= set(string.hexdigits):
+        raise argparse.ArgumentTypeError(f"expected chroma or a colour as in #203040, got {text!r}")
+    red, green, blue = bytes.fromhex(digits)
+    return red, green, blue
+
+
 def host_port(text: str) -> tuple[str, int | None]:
     """A host and a port from ``HOST:PORT``; None where there is no port."""
     host, colon, port = text.rpartition(":") if text.count(":") == 1 else (text, "", "")
@@ -114,7 +128,14 @@ def _add_show_options(parser: argparse.ArgumentParser) -> None:
     )
     show.add_argument("--speed", type=positive, default=1.0, metavar="X", help="times the recorded")
     show.add_argument("--loop", action="store_true", help="start again after the last frame")
-    show.add_argument("--transparent", action="store_true", help="no stage behind the character")
+    behind = show.add_mutually_exclusive_group()
+    behind.add_argument("--transparent", action="store_true", help="no stage behind the character")
+    behind.add_argument(
+        "--background",
+        type=colour,
+        metavar="COLOUR|chroma",
+        help="a plain colour such as #203040 instead of the stage; chroma is the green to key out",
+    )
     show.add_argument(
         "--plain", action="store_true", help="without the matched chains and the mirror"
     )

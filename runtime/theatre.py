@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -10,9 +11,11 @@ from numpy.typing import NDArray
 
 from devices.skeleton import Skeleton
 from runtime.character import Character
+from runtime.fade import Fade
 from runtime.mapping import Mapping
 from runtime.performer import Pose
 from runtime.puppet import Motion, Puppet
+from runtime.render.background import Background
 from runtime.render.camera import front_camera
 from runtime.render.inset import SkeletonInset
 from runtime.render.stage import Stage
@@ -22,6 +25,7 @@ if TYPE_CHECKING:
     import moderngl
 
 GAP = 0.18  # metres of floor between two characters
+BLACKOUT = 0.3  # seconds until all is dark, and until it is light again
 ROOM = 0.12  # share of its size that a character may move beyond its rest pose and stay in view
 
 
@@ -33,8 +37,15 @@ class Theatre:
         size: width and height of the picture [px].
         puppets: who is on stage, from left to right.
         performer: the skeleton shown in the mirror.
-        transparent: no house and no floor, and plain.
+        background: what is there instead of house and floor; then it is plain, too.
         plain: neither the matched chains nor the mirror.
+        clock: host monotonic time [s].
+
+    Attributes:
+        stage: draws.
+        camera: where the picture is taken from.
+        highlights: whether the matched chains are shown.
+        blackout: 1 where nothing of the show is to be seen.
     """
 
     def __init__(
@@ -44,10 +55,12 @@ class Theatre:
         puppets: Sequence[Puppet],
         performer: Skeleton,
         *,
-        transparent: bool = False,
+        background: Background | None = None,
         plain: bool = False,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        self.stage = Stage(context, size, transparent=transparent)
+        self.blackout = Fade(BLACKOUT, clock)
+        self.stage = Stage(context, size, background=background)
         self._puppets = puppets
         self._captions = len(puppets) > 1
         places = _side_by_side([puppet.character for puppet in puppets])
@@ -59,8 +72,9 @@ class Theatre:
             )
             for puppet, place in zip(puppets, places, strict=True)
         ]
-        self._inset = None if plain or transparent else SkeletonInset(performer.parents)
-        self.highlights = not (plain or transparent)
+        plain = plain or background is not None
+        self._inset = None if plain else SkeletonInset(performer.parents)
+        self.highlights = not plain
         self.camera = front_camera()
         self._filled: NDArray[np.float64] | None = None
         self.frame_all()
@@ -106,6 +120,7 @@ class Theatre:
                 colours=_joint_colours(len(pose.seen), self._puppets[0].mapping),
                 dimmed=pose.filled,
             )
+        self.stage.brightness = 1.0 - self.blackout.level
         self.stage.draw(self.camera, self._inset if pose is not None else None)
 
     def picture(self) -> NDArray[np.uint8]:

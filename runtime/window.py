@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +15,15 @@ from runtime.render.context import current_context, leave_headless
 
 ORBIT_SPEED = 0.006  # rad a pixel
 ZOOM_STEP = 1.12  # a notch of the wheel
+
+
+CONTEXT_HINTS: dict[int, int] = {
+    glfw.CONTEXT_VERSION_MAJOR: 3,
+    glfw.CONTEXT_VERSION_MINOR: 3,
+    glfw.OPENGL_PROFILE: glfw.OPENGL_CORE_PROFILE,
+    glfw.OPENGL_FORWARD_COMPAT: True,
+    glfw.SAMPLES: 0,  # the stage has its own multisampling
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +62,8 @@ KEY_NAMES = {
     glfw.KEY_DOWN: "down",
     glfw.KEY_HOME: "home",
     glfw.KEY_END: "end",
+    glfw.KEY_PAGE_UP: "page-up",
+    glfw.KEY_PAGE_DOWN: "page-down",
     **{getattr(glfw, f"KEY_F{number}"): f"f{number}" for number in range(1, 13)},
 }
 
@@ -60,6 +72,13 @@ class Window:
     """A window with an OpenGL 3.3 context, current on this thread.
 
     The left button orbits the camera, the right or middle one pans, the wheel zooms.
+
+    Args:
+        title: stands above it.
+        size: width and height [px].
+        visible: whether anybody sees it.
+        transparent: let the desktop show through where the picture's alpha is low, if the window
+            manager composites; elsewhere that is black.
 
     Attributes:
         camera: what the mouse moves; set it to frame something else.
@@ -70,8 +89,16 @@ class Window:
         InputError: there is no display, or no OpenGL 3.3 on it.
     """
 
-    def __init__(self, title: str, size: tuple[int, int], *, visible: bool = True) -> None:
-        self.handle: Any = _open_window(title, size, visible)
+    def __init__(
+        self,
+        title: str,
+        size: tuple[int, int],
+        *,
+        visible: bool = True,
+        transparent: bool = False,
+    ) -> None:
+        hints = {glfw.VISIBLE: visible, glfw.TRANSPARENT_FRAMEBUFFER: transparent}
+        self.handle: Any = _open_window(title, size, hints)
         try:
             self.context: moderngl.Context = current_context(glfw.get_proc_address)
         except InputError:
@@ -159,7 +186,7 @@ class Window:
         self._events.append(Resized((max(width, 1), max(height, 1))))
 
 
-def _open_window(title: str, size: tuple[int, int], visible: bool) -> Any:
+def _open_window(title: str, size: tuple[int, int], hints: Mapping[int, bool]) -> Any:
     """Ask glfw for a window and make its context current."""
     problems: list[str] = []
     report: Any = lambda _code, text: problems.append(text.decode("utf-8", "replace"))  # noqa: E731
@@ -167,14 +194,7 @@ def _open_window(title: str, size: tuple[int, int], visible: bool) -> Any:
     leave_headless()
     handle = None
     if glfw.init():
-        for hint, value in (
-            (glfw.CONTEXT_VERSION_MAJOR, 3),
-            (glfw.CONTEXT_VERSION_MINOR, 3),
-            (glfw.OPENGL_PROFILE, glfw.OPENGL_CORE_PROFILE),
-            (glfw.OPENGL_FORWARD_COMPAT, True),
-            (glfw.SAMPLES, 0),  # the stage has its own multisampling
-            (glfw.VISIBLE, visible),
-        ):
+        for hint, value in ({**CONTEXT_HINTS, **hints}).items():
             glfw.window_hint(hint, value)
         handle = glfw.create_window(*size, title, None, None)
     if not handle:

@@ -40,6 +40,7 @@ from runtime.progress import Progress
 from runtime.provenance import provenance
 from runtime.puppet import Puppet
 from runtime.rehearsal import rehearse
+from runtime.render.background import NOTHING, Background
 from runtime.render.camera import front_camera
 from runtime.render.context import headless_context, release_headless
 from runtime.skin import Elasticity
@@ -130,6 +131,13 @@ def _made(character: Character, number: int, options: argparse.Namespace) -> Pup
     return puppet
 
 
+def _background(options: argparse.Namespace) -> Background | None:
+    """What is there instead of the house, if anything is."""
+    if options.transparent:
+        return NOTHING
+    return None if options.background is None else Background(*options.background)
+
+
 class _Show:
     """One show as the command line asked for it; what it opens is left to `closing`."""
 
@@ -147,7 +155,9 @@ class _Show:
         self._puppets = [_made(one, number, options) for number, one in enumerate(characters)]
         self._window = None
         if not options.headless:
-            self._window = closing.enter_context(Window("Bunraku", options.size))
+            self._window = closing.enter_context(
+                Window("Bunraku", options.size, transparent=options.transparent)
+            )
         self._theatre = self._open_theatre()
         self._acts = self._call_acts()
 
@@ -233,7 +243,7 @@ class _Show:
             size,
             self._puppets,
             self._stream.skeleton,
-            transparent=self._options.transparent,
+            background=_background(self._options),
             plain=self._options.plain,
         )
         self._closing.callback(theatre.close)

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from devices.errors import InputError
 from runtime.character import Character
 from runtime.render.actor import Actor, ActorPrograms
+from runtime.render.background import Background
 from runtime.render.camera import Camera
 from runtime.render.caption import CaptionPainter
 from runtime.render.floor import Floor, ShadowMaps
@@ -20,6 +21,8 @@ from runtime.render.tubes import TubePainter
 
 CLIP_DISTANCE0 = 0x3000
 OVER = (moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)
+UNDER = (moderngl.ONE_MINUS_DST_ALPHA, moderngl.ONE)
+DIM = (moderngl.ZERO, moderngl.SRC_ALPHA)
 
 
 class Stage:
@@ -33,7 +36,11 @@ class Stage:
         context: an OpenGL 3.3 context, current on this thread.
         size: width and height of the picture [px].
         samples: samples a pixel on the actors' edges; fewer where the driver has fewer.
-        transparent: no house and no floor; `read` gives straight alpha.
+        background: what is there instead of the house; its alpha is `read` straight.
+
+    Attributes:
+        brightness: 1, down to 0: the picture is black, or where there is no house the background
+            alone, so that whoever keys it out sees nothing of the actors.
     """
 
     def __init__(
@@ -42,11 +49,12 @@ class Stage:
         size: tuple[int, int],
         *,
         samples: int = 4,
-        transparent: bool = False,
+        background: Background | None = None,
     ) -> None:
+        self.brightness = 1.0
         self._context = context
         self._samples = min(samples, context.max_samples)
-        self._transparent = transparent
+        self._background = background
         self._actors: list[Actor] = []
         self._programs = ActorPrograms(
             depth=link(context, "depth", "depth"),
@@ -64,6 +72,8 @@ class Stage:
         self._backdrop_array = context.vertex_array(self._backdrop_program, [])
         self._lay_program = link(context, "whole", "resolved")
         self._lay_array = context.vertex_array(self._lay_program, [])
+        self._fill_program = link(context, "whole", "fill")
+        self._fill_array = context.vertex_array(self._fill_program, [])
         self._frame = context.buffer(reserve=FRAME.itemsize, dynamic=True)
         self._mirrored = context.buffer(reserve=FRAME.itemsize, dynamic=True)
         self._targets = self._make_targets(size)
@@ -136,13 +146,17 @@ class Stage:
         self._seen = covered(camera, self.size, self.boxes)
         self._share(camera, light, pools)
         self._context.enable_only(moderngl.DEPTH_TEST)
-        self._maps.draw(self._actors, light, contact=not self._transparent)
+        self._maps.draw(self._actors, light, contact=self._background is None)
         self._draw_actors(light)
-        if self._transparent:
-            self._targets.picture.clear()
-        else:
+        if self._background is None:
             self._draw_house(camera, pools)
+        else:
+            self._targets.picture.clear()
         self._lay_over(camera, inset)
+        if self.brightness < 1.0:
+            self._fill(DIM, (0.0, 0.0, 0.0, max(self.brightness, 0.0)))
+        if self._background is not None and self._background.alpha > 0:
+            self._fill(UNDER, self._background.premultiplied)
 
     def _share(self, camera: Camera, light: Lighting, pools: NDArray[np.float64]) -> None:
         for buffer, mirrored in ((self._frame, False), (self._mirrored, True)):
@@ -151,7 +165,7 @@ class Stage:
                 self.size,
                 light,
                 pools,
-                on_floor=not self._transparent,
+                on_floor=self._background is None,
                 mirrored=mirrored,
             )
             buffer.orphan()
@@ -211,6 +225,16 @@ class Stage:
         if inset is not None:
             self._inset.draw(inset, self._tubes, picture)
 
+    def _fill(
+        self, blend: tuple[int, int], premultiplied: tuple[float, float, float, float]
+    ) -> None:
+        """Blend one colour into the whole picture."""
+        self._targets.picture.use()
+        self._context.enable_only(moderngl.BLEND)
+        self._context.blend_func = blend
+        self._fill_program["premultiplied"] = premultiplied
+        self._fill_array.render(moderngl.TRIANGLES, vertices=3)
+
     def _draw_captions(self, to_clip: NDArray[np.float64]) -> None:
         for actor in self._actors:
             if actor.caption:
@@ -231,7 +255,7 @@ class Stage:
         width, height = self.size
         data = self._targets.picture.read(components=4, alignment=1)
         pixels = np.frombuffer(data, dtype=np.uint8).reshape(height, width, 4)[::-1].copy()
-        if not self._transparent:
+        if self._background is None or self._background.alpha == 255:
             pixels[..., 3] = 255
             return pixels
         alpha = pixels[..., 3:].astype(np.uint16)
@@ -245,7 +269,8 @@ class Stage:
             self.remove(actor)
         release_all(self._targets, self._maps, self._floor, self._tubes, self._inset)
         release_all(self._caption, self._backdrop_array, self._backdrop_program)
-        release_all(self._lay_array, self._lay_program, self._frame, self._mirrored)
+        release_all(self._lay_array, self._lay_program, self._fill_array, self._fill_program)
+        release_all(self._frame, self._mirrored)
         programs = self._programs
         release_all(programs.depth, programs.plain, programs.textured, programs.mirror)
 

@@ -20,6 +20,7 @@ from PIL import Image
 from devices.errors import InputError
 from devices.skeleton import Skeleton
 from runtime.character import Character, Material, Surface
+from runtime.render.background import NOTHING, Background
 from runtime.render.camera import front_camera
 from runtime.render.context import (
     headless_context,
@@ -63,7 +64,7 @@ def stage(context: moderngl.Context) -> Iterator[Stage]:
 
 @pytest.fixture
 def bare(context: moderngl.Context) -> Iterator[Stage]:
-    stage = Stage(context, SIZE, transparent=True)
+    stage = Stage(context, SIZE, background=NOTHING)
     yield stage
     stage.release()
 
@@ -200,6 +201,66 @@ def test_without_a_house_only_the_actor_is_opaque(bare: Stage) -> None:
     assert picture[edge, 0].mean() > 60  # straight, not darkened towards the transparent side
 
 
+@pytest.mark.parametrize("colour", [(0, 255, 0), (32, 48, 64)])
+def test_a_plain_background_is_that_colour_exactly_and_nothing_falls_on_it(
+    context: moderngl.Context, bare: Stage, colour: tuple[int, int, int]
+) -> None:
+    bare.add(ball())
+    bare.draw(CAMERA)
+    alone = bare.read()
+    stage = Stage(context, SIZE, background=Background(*colour))
+    stage.add(ball())
+    stage.draw(CAMERA)
+    picture = stage.read()
+    stage.release()
+    assert (picture[..., 3] == 255).all()
+    empty, full = alone[..., 3] == 0, alone[..., 3] == 255
+    assert (picture[empty][:, :3] == colour).all(), "no shadow, no reflection, no noise"
+    np.testing.assert_array_equal(picture[full], alone[full], "and the actor as without it")
+
+
+def test_laid_over_anything_the_transparent_picture_is_the_one_drawn_there(
+    context: moderngl.Context, bare: Stage
+) -> None:
+    """No halo: edges are as if the actor had been drawn on the colour in the first place."""
+    bare.add(ball())
+    bare.draw(CAMERA)
+    straight = bare.read().astype(float)
+    share = straight[..., 3:] / 255.0
+    for colour in ((0, 255, 0), (255, 255, 255), (0, 0, 0)):
+        stage = Stage(context, SIZE, background=Background(*colour))
+        stage.add(ball())
+        stage.draw(CAMERA)
+        drawn = stage.read()[..., :3].astype(float)
+        stage.release()
+        laid = straight[..., :3] * share + np.array(colour) * (1.0 - share)
+        assert np.abs(laid - drawn).max() <= 2.0
+
+
+@pytest.mark.parametrize("background", [None, NOTHING, Background(0, 255, 0)])
+def test_the_stage_goes_dark_down_to_black_or_to_the_background_alone(
+    context: moderngl.Context, background: Background | None
+) -> None:
+    stage = Stage(context, SIZE, background=background)
+    actor = stage.add(ball(), caption="ball")
+    pictures = []
+    for stage.brightness in (1.0, 0.5, 0.0, 1.0):
+        stage.draw(CAMERA, performer())
+        pictures.append(stage.read().astype(int))
+    light, half, dark, again = pictures
+    np.testing.assert_array_equal(again, light)
+    if background is None:
+        assert (dark[..., :3] == 0).all()
+        assert (dark[..., 3] == 255).all()
+        assert np.abs(half[..., :3] - light[..., :3] / 2.0).max() <= 1.0
+    else:
+        stage.remove(actor)
+        stage.draw(CAMERA)
+        np.testing.assert_array_equal(dark, stage.read())
+        assert abs(half[90, 160, 3] - (128 if background is NOTHING else 255)) <= 1
+    stage.release()
+
+
 def test_the_house_is_opaque_everywhere(stage: Stage) -> None:
     stage.add(ball())
     stage.draw(CAMERA)
@@ -246,7 +307,7 @@ def test_both_sides_of_a_sheet_are_lit_alike(context: moderngl.Context) -> None:
     )
     pictures = []
     for either in (shape, turned):  # the camera sees the front of one, the back of the other
-        stage = Stage(context, SIZE, transparent=True)
+        stage = Stage(context, SIZE, background=NOTHING)
         stage.add(either)
         stage.draw(CAMERA)
         pictures.append(stage.read().astype(int))

@@ -13,9 +13,10 @@ from devices.skeleton import Skeleton
 from runtime.mapping import Mapping
 from runtime.performer import Performer, Pose, rest_state
 from runtime.puppet import Body, Motion, Puppet
+from runtime.render.background import NOTHING
 from runtime.render.camera import Camera, box_corners
 from runtime.render.context import headless_context, release_headless
-from runtime.theatre import GAP, Theatre
+from runtime.theatre import BLACKOUT, GAP, Theatre
 from tests.runtime.figures import ARMS, BODY, FRONT_VIEW, T_POSE, frame, make_figure, pose
 
 SIZE = (96, 54)
@@ -217,10 +218,30 @@ def test_a_transparent_stage_shows_the_character_alone(
 ) -> None:
     one = puppets[:1]
     rested(one)
-    theatres.append(Theatre(context, SIZE, one, BODY, transparent=True, plain=True))
+    theatres.append(Theatre(context, SIZE, one, BODY, background=NOTHING))
     shown = picture(theatres[0], one, seen(pose()))
     assert shown[0, 0, 3] == shown[-1, -1, 3] == 0
     assert 0.02 < (shown[..., 3] > 128).mean() < 0.6
+
+
+def test_a_blackout_fades_all_to_black_and_back(
+    context: moderngl.Context, puppets: list[Puppet], theatres: list[Theatre]
+) -> None:
+    one, now = puppets[:1], [10.0]
+    rested(one)
+    theatre = Theatre(context, SIZE, one, BODY, clock=lambda: now[0])
+    theatres.append(theatre)
+    light = picture(theatre, one, seen(pose()))[..., :3].astype(int)
+    theatre.blackout.to(1.0)
+    levels = []
+    for now[0] in (10.0, 10.1, 10.2, 10.0 + BLACKOUT, 20.0):
+        shown = picture(theatre, one, seen(pose()))[..., :3].astype(int)
+        assert (shown <= light).all()
+        levels.append(shown.sum() / light.sum())
+    assert levels[0] == 1.0 > levels[1] > 0.5 > levels[2] > levels[3] == levels[4] == 0.0
+    theatre.blackout.to(0.0)
+    now[0] += BLACKOUT
+    np.testing.assert_array_equal(picture(theatre, one, seen(pose()))[..., :3], light)
 
 
 def test_any_performer_fits_into_the_mirror(
