@@ -126,7 +126,8 @@ def _check_report(report: dict[str, Any]) -> None:
         assert 0.0 <= stage["p50"] <= stage["p99"] <= stage["max"]
     assert 0.0 < report["stretch"]["mean"] < report["stretch"]["p99"] < 0.5
     assert set(report) == {
-        "frames", "dropped", "recording", "character", "match", "stages_ms", "stretch",
+        "frames", "dropped", "recording", "record", "character", "match", "stages_ms", "stretch",
+        "watchdog",
     }  # fmt: skip
 
 
