@@ -12,6 +12,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from runtime.character import Character
+from solvers.compiled import kernel
 
 CREASE = math.radians(62.0)
 
@@ -141,7 +142,24 @@ class DeformingNormals:
         return self._out
 
 
-@njit(cache=True, error_model="numpy")
+@njit(inline="always", error_model="numpy")
+def _angle(x: float, y: float) -> float:
+    """The angle in [0, pi] of (x, y) with y > 0, to 2e-8; atan2 took half the time here.
+
+    Source: Abramowitz and Stegun, Handbook of Mathematical Functions, 1964, 4.4.49.
+    """
+    side = abs(x)
+    t = min(side, y) / max(side, y)
+    s = t * t
+    turn = 0.1065626393 + s * (
+        -0.0752896400 + s * (0.0429096138 + s * (-0.0161657367 + s * 0.0028662257))
+    )
+    turn = t * (1.0 + s * (-0.3333314528 + s * (0.1999355085 + s * (-0.1420889944 + s * turn))))
+    turn = 0.5 * math.pi - turn if y > side else turn
+    return math.pi - turn if x < 0.0 else turn
+
+
+@kernel
 def _weigh_corners(
     vertices: NDArray[np.float64], faces: NDArray[np.int32], out: NDArray[np.float64]
 ) -> None:
@@ -156,14 +174,11 @@ def _weigh_corners(
             out[3 * f : 3 * f + 3] = 0.0
             continue
         uv, uu = ux * vx + uy * vy + uz * vz, ux * ux + uy * uy + uz * uz
-        at_a = math.atan2(double_area, uv)
-        at_b = math.atan2(double_area, uu - uv)
-        for k in range(3):
-            angle = at_a if k == 0 else at_b if k == 1 else math.pi - at_a - at_b
-            weight = angle / double_area
-            out[3 * f + k, 0] = nx * weight
-            out[3 * f + k, 1] = ny * weight
-            out[3 * f + k, 2] = nz * weight
+        at_a = _angle(uv, double_area) / double_area
+        at_b = _angle(uu - uv, double_area) / double_area
+        at_c = math.pi / double_area - at_a - at_b
+        for corner, weight in ((3 * f, at_a), (3 * f + 1, at_b), (3 * f + 2, at_c)):
+            out[corner, 0], out[corner, 1], out[corner, 2] = nx * weight, ny * weight, nz * weight
 
 
 @njit(cache=True, error_model="numpy")
