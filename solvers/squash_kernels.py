@@ -132,19 +132,21 @@ def fit_scaled_cells(x: Floats, cells: Cells, planes: Planes, cartoon: float, ou
     count = len(cells.starts) - 1
     for block in prange((count + LANES - 1) // LANES):
         lanes, first = room[get_thread_id()], block * LANES
-        size = min(LANES, count - first)
         _covariances(x, cells, first, lanes, laplace_x)
-        fit_rotations(lanes, size)
-        for k in range(size):
-            i = first + k
-            trace = 0.0
-            for entry in range(9):
-                trace += lanes[entry * LANES + k] * lanes[_R + entry * LANES + k]
-            s = 1.0 + (trace - planes.extents[i, 0]) * planes.extents[i, 1]
-            s = 1.0 + cartoon * (min(max(s, LEAST_SCALE), LARGEST_SCALE) - 1.0)
-            scales[i] = s
-            for entry in range(9):
-                matrices[i, entry] = s * lanes[_R + entry * LANES + k]
+        fit_rotations(lanes, min(LANES, count - first))
+        _scale_block(lanes, first, planes, cartoon, (matrices, scales))
+
+
+@parallel_kernel
+def scale_cells(x: Floats, cells: Cells, planes: Planes, cartoon: float, out: Fit) -> None:
+    """Like `fit_scaled_cells`, but the rotations are those that `out` holds already."""
+    matrices, scales, laplace_x, room = out
+    count = len(cells.starts) - 1
+    for block in prange((count + LANES - 1) // LANES):
+        lanes, first = room[get_thread_id()], block * LANES
+        _covariances(x, cells, first, lanes, laplace_x)
+        _load_rotations(lanes, first, matrices)
+        _scale_block(lanes, first, planes, cartoon, (matrices, scales))
 
 
 @parallel_kernel
@@ -155,31 +157,78 @@ def fit_pose_cells(x: Floats, cells: Cells, planes: Planes, gain: float, out: Fi
     cell's plane; see `solvers.squash_stretch`.
     """
     matrices, scales, laplace_x, room = out
-    axes = planes.axes
     count = len(cells.starts) - 1
     for block in prange((count + LANES - 1) // LANES):
         lanes, first = room[get_thread_id()], block * LANES
-        size = min(LANES, count - first)
         _covariances(x, cells, first, lanes, laplace_x)
-        fit_rotations(lanes, size)
-        _stretch(lanes, size, planes, first)
-        _volume_scales(lanes, size, gain)
-        for k in range(size):
-            i = first + k
-            scales[i] = lanes[k]
-            aa, ab, bb = lanes[LANES + k], lanes[2 * LANES + k], lanes[3 * LANES + k]
-            off = lanes[4 * LANES + k]
-            a0, a1, a2 = axes[i, 0], axes[i, 1], axes[i, 2]
-            b0, b1, b2 = axes[i, 3], axes[i, 4], axes[i, 5]
-            for row in range(3):
-                r0 = lanes[_R + 3 * row * LANES + k]
-                r1 = lanes[_R + (3 * row + 1) * LANES + k]
-                r2 = lanes[_R + (3 * row + 2) * LANES + k]
-                ra, rb = r0 * a0 + r1 * a1 + r2 * a2, r0 * b0 + r1 * b1 + r2 * b2
-                pa, pb = ra * aa + rb * ab, ra * ab + rb * bb
-                matrices[i, 3 * row] = off * r0 + pa * a0 + pb * b0
-                matrices[i, 3 * row + 1] = off * r1 + pa * a1 + pb * b1
-                matrices[i, 3 * row + 2] = off * r2 + pa * a2 + pb * b2
+        fit_rotations(lanes, min(LANES, count - first))
+        _pose_block(lanes, first, planes, gain, (matrices, scales))
+
+
+@parallel_kernel
+def pose_cells(x: Floats, cells: Cells, planes: Planes, gain: float, out: Fit) -> None:
+    """Like `fit_pose_cells`, but the rotations are those that `out` holds already."""
+    matrices, scales, laplace_x, room = out
+    count = len(cells.starts) - 1
+    for block in prange((count + LANES - 1) // LANES):
+        lanes, first = room[get_thread_id()], block * LANES
+        _covariances(x, cells, first, lanes, laplace_x)
+        _load_rotations(lanes, first, matrices)
+        _pose_block(lanes, first, planes, gain, (matrices, scales))
+
+
+@kernel
+def _load_rotations(lanes: Floats, first: int, R: Floats) -> None:
+    for k in range(min(LANES, len(R) - first)):
+        for entry in range(9):
+            lanes[_R + entry * LANES + k] = R[first + k, entry]
+
+
+@kernel
+def _scale_block(
+    lanes: Floats, first: int, planes: Planes, cartoon: float, out: tuple[Floats, Floats]
+) -> None:
+    """The scales of LANES cells from their covariances and rotations, and both multiplied."""
+    extents = planes.extents
+    matrices, scales = out
+    for k in range(min(LANES, len(scales) - first)):
+        i = first + k
+        trace = 0.0
+        for entry in range(9):
+            trace += lanes[entry * LANES + k] * lanes[_R + entry * LANES + k]
+        s = 1.0 + (trace - extents[i, 0]) * extents[i, 1]
+        s = 1.0 + cartoon * (min(max(s, LEAST_SCALE), LARGEST_SCALE) - 1.0)
+        scales[i] = s
+        for entry in range(9):
+            matrices[i, entry] = s * lanes[_R + entry * LANES + k]
+
+
+@kernel
+def _pose_block(
+    lanes: Floats, first: int, planes: Planes, gain: float, out: tuple[Floats, Floats]
+) -> None:
+    """V R of LANES cells from their covariances and rotations, and the scales on the axes."""
+    axes = planes.axes
+    matrices, scales = out
+    size = min(LANES, len(scales) - first)
+    _stretch(lanes, size, planes, first)
+    _volume_scales(lanes, size, gain)
+    for k in range(size):
+        i = first + k
+        scales[i] = lanes[k]
+        aa, ab, bb = lanes[LANES + k], lanes[2 * LANES + k], lanes[3 * LANES + k]
+        off = lanes[4 * LANES + k]
+        a0, a1, a2 = axes[i, 0], axes[i, 1], axes[i, 2]
+        b0, b1, b2 = axes[i, 3], axes[i, 4], axes[i, 5]
+        for row in range(3):
+            r0 = lanes[_R + 3 * row * LANES + k]
+            r1 = lanes[_R + (3 * row + 1) * LANES + k]
+            r2 = lanes[_R + (3 * row + 2) * LANES + k]
+            ra, rb = r0 * a0 + r1 * a1 + r2 * a2, r0 * b0 + r1 * b1 + r2 * b2
+            pa, pb = ra * aa + rb * ab, ra * ab + rb * bb
+            matrices[i, 3 * row] = off * r0 + pa * a0 + pb * b0
+            matrices[i, 3 * row + 1] = off * r1 + pa * a1 + pb * b1
+            matrices[i, 3 * row + 2] = off * r2 + pa * a2 + pb * b2
 
 
 @kernel

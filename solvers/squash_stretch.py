@@ -36,8 +36,10 @@ from solvers.squash_kernels import (
     find_pressures,
     fit_pose_cells,
     fit_scaled_cells,
+    pose_cells,
     push,
     rest_covariances,
+    scale_cells,
     strain_cells,
     sum_parts,
     volume_terms,
@@ -137,6 +139,24 @@ class SquashStretchSolver(ArapSolver):
             iterations -= 1
         return super().solve(targets, iterations, out=out)
 
+    def reset(self) -> None:
+        """Forget the last answer: the next solve starts from the rest pose."""
+        super().reset()
+        self._cell_scales[:] = 1.0
+
+    @property
+    def energy(self) -> float:
+        """Eq. (4) of the shape state under its best rotations and scales, and the terms that are
+        on between rotations, in the vertices' unit squared.
+        """
+        kept = self._R.copy(), self._cell_scales.copy()
+        self._local_step(self._x)
+        energy = self._sum_terms(self._x)
+        self._unscale()
+        energy += self._priors.energy(self._R)
+        self._R[:], self._cell_scales[:] = kept
+        return energy * self._frame.size**2
+
     def rotations(self) -> Floats:
         """How each vertex's cell was turned by the last iteration, without its scale, (N, 3, 3)."""
         scaled = super().rotations()
@@ -154,11 +174,25 @@ class SquashStretchSolver(ArapSolver):
         return self._scales[self._layout.place]
 
     def _local_step(self, x: Floats) -> None:
-        if self._cartoon == 0.0:
-            super()._local_step(x)
+        if self._priors.is_on:  # they compare rotations, and know of no scales
+            self._unscale()
+        super()._local_step(x)
+        if self._priors.is_on and self._cartoon > 0.0:
+            fit = Fit(self._R, self._cell_scales, self._laplace_x, self._room)
+            scale_cells(x, self._mesh.cells, self._planes, self._cartoon, fit)
+
+    def _fit(self, x: Floats, priors: Floats) -> None:
+        if self._cartoon == 0.0 or len(priors):
+            super()._fit(x, priors)
+            self._cell_scales[:] = 1.0
         else:
             fit = Fit(self._R, self._cell_scales, self._laplace_x, self._room)
             fit_scaled_cells(x, self._mesh.cells, self._planes, self._cartoon, fit)
+
+    def _unscale(self) -> None:
+        """Take the scales out of the cells' matrices."""
+        self._R /= self._cell_scales[:, None]
+        self._cell_scales[:] = 1.0
 
     def _pose_step(self) -> Floats:
         """The pose state: from the shape state's x, which it leaves, the surface to show."""
@@ -166,7 +200,12 @@ class SquashStretchSolver(ArapSolver):
             return self._x
         gain = self._volume_gain * self._cartoon
         fit = Fit(self._VR, self._scales, self._laplace_x, self._room)
-        fit_pose_cells(self._x, self._mesh.cells, self._planes, gain, fit)
+        if self._priors.is_on:
+            self._local_step(self._x)
+            np.divide(self._R, self._cell_scales[:, None], out=self._VR)
+            pose_cells(self._x, self._mesh.cells, self._planes, gain, fit)
+        else:
+            fit_pose_cells(self._x, self._mesh.cells, self._planes, gain, fit)
         shape, sR = self._x, self._R
         self._pose[:] = shape
         self._x, self._R = self._pose, self._VR

@@ -19,7 +19,7 @@ FRAMES = 60
 SHARES = (0.30, 0.20, 0.10, 0.05)
 
 _FINER = 2  # drawn this much larger, for smooth edges
-_SETTLED = 200  # iterations after which the plain equations count as settled
+_SETTLED = 150  # iterations after which the plain equations count as settled
 _INK, _PAPER, _GRID = (58, 48, 40), (250, 246, 238), (226, 218, 204)
 _COLOURS = {
     "ARAP, plain": (196, 178, 150),
@@ -48,7 +48,7 @@ class Curves:
 
 def measure() -> list[Curves]:
     """The curves of four constraints on a round bar with patches at both ends."""
-    vertices, faces = revolved(np.linspace(0.0, 4.0, 36), np.full(36, 0.5), 16)
+    vertices, faces = revolved(np.linspace(0.0, 4.0, 32), np.full(32, 0.5), 14)
     x = vertices[:, 0]
     handles = np.flatnonzero((x < 0.3) | (x > 3.7))
     right = (x[handles] > 2.0)[:, None]

@@ -67,7 +67,7 @@ class PlainSolver:
         push = np.zeros_like(x)
         push[self._free] = self._factor.solve(volume_gradient(x, self._faces)[self._free])
         multiplier = 0.0
-        for _ in range(8):
+        for _ in range(5):
             moved = x + multiplier * push
             slope = float((volume_gradient(moved, self._faces) * push).sum())
             if not slope > 0.0:  # a sheet has no volume to keep

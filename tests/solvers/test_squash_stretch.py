@@ -363,6 +363,49 @@ def test_rigid_is_the_rigid_solver_to_the_last_bit(energy: str):
     assert solver.energy == rigid.energy
 
 
+@pytest.mark.parametrize("energy", [*ENERGIES, "smooth-rotations"])
+def test_rigid_with_stiff_parts_is_the_rigid_solver_to_the_last_bit(energy: str):
+    press = Press.on(*capsule())
+    rigid = ArapSolver(*capsule(), press.handles, groups=press.groups, energy=energy)
+    solver = press.solver(cartoon=0.0, energy=energy)
+    upper = (press.vertices[:, 1] > 0.2).astype(int)
+    for one in (rigid, solver):
+        one.stiffen(upper, np.where(abs(press.vertices[:, 1]) > 0.4, 1.0, 0.0))
+        one.stiffness = 0.7
+    for ratio in (0.9, 1.4):
+        expected = rigid.solve(press.targets(ratio), 3)
+        assert (solver.solve(press.targets(ratio), 3) == expected).all()
+        assert solver.energy == rigid.energy
+
+
+def test_stiff_parts_turn_as_one_while_they_squash():
+    vertices, faces = cylinder(4.0)
+    y = vertices[:, 1]
+    handles = np.flatnonzero((y < 0.3) | (y > 3.7))
+    groups = (y[handles] > 2.0).astype(int)
+    turn = Rotation.from_rotvec([0.0, 0.0, 1.2])
+    middle = np.array([0.0, 2.0, 0.0])
+    targets = vertices[handles].copy()
+    targets[groups == 1] = turn.apply(0.8 * (targets[groups == 1] - middle)) + middle
+    inside = (y > 0.6) & (y < 1.5)
+
+    def spread(stiffness: float) -> float:
+        solver = SquashStretchSolver(vertices, faces, handles, groups=groups)
+        solver.stiffen((y > 2.0).astype(int), np.clip(4.0 * (abs(y - 2.0) - 0.2), 0.0, 1.0))
+        solver.stiffness = stiffness
+        for _ in range(60):
+            answer = solver.solve(targets, 3)
+        assert np.isfinite(answer).all()
+        assert volume(answer, faces) == pytest.approx(volume(vertices, faces), rel=0.1)
+        R = solver.rotations()[inside]
+        np.testing.assert_allclose(
+            R @ np.swapaxes(R, 1, 2), np.tile(np.eye(3), (len(R), 1, 1)), atol=1e-9
+        )
+        return float(np.linalg.norm(R - R.mean(axis=0), axis=(1, 2)).mean())
+
+    assert spread(0.95) < 0.6 * spread(0.0)
+
+
 def test_from_rigid_to_cartoon_without_a_step():
     press = Press.on(*capsule())
     answers = []
