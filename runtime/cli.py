@@ -281,6 +281,37 @@ def _command(module: str, function: str) -> Command:
     return run
 
 
+def _add_bench_options(bench: argparse.ArgumentParser) -> None:
+    bench.add_argument(
+        "name",
+        nargs="?",
+        metavar="NAME",
+        help="arap, table1, hold, dense, tick or match, all if absent; clips, soak, kill or "
+        "latency, which take long",
+    )
+    bench.add_argument("--seconds", type=positive, help="of show in `bench soak` (default 3600)")
+    bench.add_argument(
+        "--real-time", action="store_true", help="soak at 60 Hz, not as fast as it goes"
+    )
+    bench.add_argument(
+        "--load", action="store_true", help="latency also beside a process that loads one core"
+    )
+    bench.add_argument(
+        "--recording",
+        action="append",
+        type=Path,
+        metavar="FILE",
+        help="for clips, instead of the built-in acts; may be repeated",
+    )
+    bench.add_argument(
+        "--character",
+        action="append",
+        metavar="C",
+        help="for clips, instead of the built-in characters; may be repeated",
+    )
+    bench.add_argument("--json", type=Path, metavar="FILE", help="write the figures there as well")
+
+
 def parser() -> argparse.ArgumentParser:
     """Every command with its options."""
     top = _Parser(
@@ -364,21 +395,7 @@ def parser() -> argparse.ArgumentParser:
     _characters(figures, required=False)
     doctor = add("doctor", _command("doctor", "doctor"), "what is wrong with this machine")
     doctor.add_argument("--warm", action="store_true", help="compile the solvers ahead of time")
-    bench = add("bench", _command("bench", "bench"), "how fast it is here")
-    bench.add_argument(
-        "name",
-        nargs="?",
-        metavar="NAME",
-        help="arap, tick or match, all if absent; soak, kill or latency, which take long",
-    )
-    bench.add_argument("--seconds", type=positive, help="of show in `bench soak` (default 3600)")
-    bench.add_argument(
-        "--real-time", action="store_true", help="soak at 60 Hz, not as fast as it goes"
-    )
-    bench.add_argument(
-        "--load", action="store_true", help="latency also beside a process that loads one core"
-    )
-    bench.add_argument("--json", type=Path, metavar="FILE", help="write the figures there as well")
+    _add_bench_options(add("bench", _command("bench", "bench"), "how fast it is here"))
     return top
 
 

@@ -12,7 +12,7 @@ from devices.errors import InputError
 from runtime.output.whole_file import check_writable, whole_file
 
 NAMES = ("arap", "table1", "hold", "dense", "tick", "match")
-LONG = ("soak", "kill", "latency")  # only when named
+LONG = ("clips", "soak", "kill", "latency")  # only when named
 
 
 def bench(options: argparse.Namespace) -> int:
@@ -37,6 +37,8 @@ def _wishes(options: argparse.Namespace) -> dict[str, Any]:
         "seconds": (options.seconds, "soak"),
         "real_time": (options.real_time or None, "soak"),
         "load": (options.load or None, "latency"),
+        "recording": (options.recording, "clips"),
+        "character": (options.character, "clips"),
     }
     for name, (value, owner) in asked.items():
         if value is not None and options.name != owner:

@@ -1,0 +1,99 @@
+"""Whole performances: how long their ticks take, and in what order they leave their surfaces.
+
+Every clip drives every character, as `bunraku replay --fast` would without a picture. For each clip
+the worst of its characters is told: tick times, edge stretch at the 99th percentile over all
+frames, and triangles that are inverted at the end or were so for long (`runtime.output.watchdog`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from devices.acts import ACTS
+from replay.builtin import builtin_recording
+from replay.formats import read_recording
+from replay.player import EveryFrame, Player
+from replay.recording import Recording
+from runtime.cast import character_named
+from runtime.character import Character
+from runtime.characters.builtin import BUILTIN
+from runtime.conditioning.switches import for_recording
+from runtime.director import Choices, Director
+from runtime.loop import FrameLoop
+from runtime.output.report import Report
+from runtime.performer import Performer
+from runtime.puppet import Puppet
+from runtime.rehearsal import rehearse
+from runtime.render.camera import front_camera
+
+FRAME_MS = 16.0  # that no tick may take
+
+
+def run(
+    recording: Sequence[Path] | None = None, character: Sequence[str] | None = None
+) -> dict[str, object]:
+    """Print a line a clip and return the figures of every clip and character.
+
+    Args:
+        recording: files to play; the built-in acts where None.
+        character: meshes or names; the built-in characters where None.
+    """
+    clips = [(path.name, read_recording(path)) for path in recording or ()]
+    clips = clips or [(act, builtin_recording(act)) for act in ACTS]
+    cast = [(name, character_named(name)) for name in character or BUILTIN]
+    print(f"clips: worst of {len(cast)} characters; no tick may take {FRAME_MS:g} ms")
+    print(
+        f"{'clip':<34} {'frames':>6} {'tick p50':>8} {'p99':>6} {'max':>6} {'over':>5}"
+        f" {'stretch p99':>11} {'inverted at end':>15} {'longest':>8}"
+    )
+    figures = {}
+    for name, clip in clips:
+        rows = {who: _perform(clip, body) for who, body in cast}
+        figures[name] = rows
+        worst = {key: max(row[key] for row in rows.values()) for key in next(iter(rows.values()))}
+        print(
+            f"{name[:34]:<34} {len(clip):>6} {worst['p50']:8.2f} {worst['p99']:6.2f}"
+            f" {worst['max']:6.2f} {worst['over']:5d} {worst['stretch_p99']:11.3f}"
+            f" {worst['inverted_last']:15d} {worst['inverted_longest']:8d}",
+            flush=True,
+        )
+    return {"frame_ms": FRAME_MS, "clips": figures}
+
+
+def _perform(recording: Recording, character: Character) -> dict[str, Any]:
+    conditioning = for_recording()
+    performer = Performer(recording.skeleton, conditioning=conditioning)
+    puppet = Puppet(character)
+    camera = front_camera()
+    director = Director(performer, [puppet], lambda: camera.view_rotation, Choices(), [None])
+    rehearse(recording, "whole", director, conditioning)
+    report = Report(None)
+    player = Player(recording, EveryFrame())
+    part = report.cast(character)
+    loop = FrameLoop(
+        player,
+        performer,
+        [puppet],
+        director=director,
+        report=report,
+        theatre=None,
+        outputs=[[part]],
+        conditioning=conditioning,
+    )
+    over = 0
+    while not player.ended:
+        start = perf_counter()
+        loop.tick()
+        over += 1e3 * (perf_counter() - start) > FRAME_MS
+    times, watchdog = report.times.summary()["frame"], part.summary()["watchdog"]
+    return {
+        "vertices": len(character.vertices),
+        **times,
+        "over": over,
+        "stretch_p99": part.summary()["stretch"]["p99"],
+        "inverted_last": watchdog["inverted"]["last"],
+        "inverted_longest": watchdog["inverted"]["longest"],
+    }
