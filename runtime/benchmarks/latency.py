@@ -8,7 +8,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import Any, Self
 from urllib.parse import urlsplit
 
 import numpy as np
@@ -33,9 +33,6 @@ from runtime.puppet import Motion, Puppet
 from runtime.render.context import headless_context, is_software, release_headless
 from runtime.theatre import Theatre
 
-if TYPE_CHECKING:
-    import moderngl
-
 RATES = (30.0, 60.0, 120.0)
 WAYS = ("zmq", "vmc")
 CHARACTER = "mannequin"
@@ -47,6 +44,7 @@ PATIENCE = 5.0  # [s] without a frame after which no more will come
 _BUSY = "while True: pass"
 
 Array = NDArray[np.float64]
+Context = Any  # of moderngl, which only the renderer names
 Live = BridgeStream | LiveStream
 
 
@@ -102,7 +100,7 @@ def run(*, load: bool = False) -> dict[str, object]:
 
 
 def measured(
-    context: moderngl.Context, way: str, rate: float, *, drawn: bool, seconds: float = MEASURED
+    context: Context, way: str, rate: float, *, drawn: bool, seconds: float = MEASURED
 ) -> Times:
     """Perform what another process sends by one way at one rate, for so long [s].
 
@@ -161,7 +159,7 @@ class _Noted:
 class _Stamping(Theatre):
     """A theatre that says when [s] the GPU had the vertices, and when the picture was there."""
 
-    context: moderngl.Context
+    context: Context
     draws = True
     uploaded = drawn = float("nan")
 
@@ -180,7 +178,7 @@ class _Stamping(Theatre):
 class _Show:
     """A live show of one character, as `bunraku live` has it."""
 
-    def __init__(self, context: moderngl.Context, stream: _Noted, *, drawn: bool) -> None:
+    def __init__(self, context: Context, stream: _Noted, *, drawn: bool) -> None:
         self._stream = stream
         self._rows: list[tuple[float, ...]] = []
         performer = Performer(stream.skeleton, "whole", for_live())

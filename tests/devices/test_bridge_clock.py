@@ -11,7 +11,7 @@ from devices.bridge_clock import DRIFT, SAMPLES, ClockOffset
 
 
 def exchange(
-    clock: ClockOffset, now: float, offset: float, there: float, back: float, think: float = 0.0
+    clock: ClockOffset, now: float, offset: float, *, there: float, back: float, think: float = 0.0
 ) -> float:
     """One exchange over ways of so many seconds; returns when it ended."""
     heard = now + there + offset
@@ -42,7 +42,7 @@ def test_however_uneven_the_ways_the_bound_holds(
 ) -> None:
     clock, now = ClockOffset(), 50.0
     for there, back in ways:
-        now = exchange(clock, now, offset, there, back) + 0.1
+        now = exchange(clock, now, offset, there=there, back=back) + 0.1
         assert abs(clock.seconds - offset) <= clock.bound + 1e-6
     best = min(there + back for there, back in ways)
     assert clock.bound <= best + DRIFT * (now - 50.0) + 1e-5
@@ -74,7 +74,7 @@ def test_the_offset_stays_where_nothing_new_is_known() -> None:
     first = clock.seconds
     for _ in range(SAMPLES // 2):
         there, back = rng.uniform(0.001, 0.1, 2)
-        now = exchange(clock, now, 1.0, there, back)
+        now = exchange(clock, now, 1.0, there=there, back=back)
     assert clock.seconds == first
 
 
