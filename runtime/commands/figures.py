@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,17 +14,13 @@ from runtime.cast import character_named
 from runtime.character import Character
 from runtime.figures import convergence
 from runtime.figures.bird import BIRD, bird, tail_volume
-from runtime.figures.gallery import Exhibit, row_picture
+from runtime.figures.gallery import Exhibit, Gallery
 from runtime.figures.plain import PlainSolver, volume
 from runtime.figures.poses import Press, perform
 from runtime.output.whole_file import check_writable, whole_file
-from runtime.render.context import headless_context, release_headless
 from solvers.arap import ArapSolver
 from solvers.laplacian import Floats
 from solvers.squash_stretch import SquashStretchSolver
-
-if TYPE_CHECKING:
-    import moderngl
 
 POSES = {"squashed": (0.65, 0.0), "stretched": (1.35, 0.0), "leaning": (0.8, 0.7)}
 _BALLOON_STEPS = 40
@@ -38,14 +34,9 @@ def figures(options: argparse.Namespace) -> int:
     folder.mkdir(parents=True, exist_ok=True)
     for path in paths:
         check_writable(path)
-    context = headless_context()
-    try:
-        rows = [_rigid_and_cartoon(context, one, options.size) for one in characters]
-        _write(paths[0], np.concatenate(rows))
-        rows = [_balloon(context, one, options.size) for one in [bird(), *characters]]
-        _write(paths[1], np.concatenate(rows))
-    finally:
-        release_headless(context)
+    with Gallery(options.size) as gallery:
+        _write(paths[0], np.concatenate([_rigid_and_cartoon(gallery, c) for c in characters]))
+        _write(paths[1], np.concatenate([_balloon(gallery, c) for c in [bird(), *characters]]))
     curves = convergence.measure()
     width = options.size[0]
     _write(paths[2], np.asarray(convergence.draw(curves, (width, 3 * width // 5))))
@@ -54,9 +45,7 @@ def figures(options: argparse.Namespace) -> int:
     return 0
 
 
-def _rigid_and_cartoon(
-    context: moderngl.Context, character: Character, size: tuple[int, int]
-) -> NDArray[np.uint8]:
+def _rigid_and_cartoon(gallery: Gallery, character: Character) -> NDArray[np.uint8]:
     """Figure 5: a character as it is, then rigid and as a cartoon, for each of the poses."""
     press = Press.on(character)
     exhibits = [Exhibit(character, character.vertices, press.handles, "at rest")]
@@ -65,7 +54,7 @@ def _rigid_and_cartoon(
             answer = perform(solver, press, ratio, lean)
             exhibits.append(Exhibit(character, answer, press.handles, f"{pose}, {name}"))
             print(f"figure 5  {character.name}, {pose}, {name}: {_kept(answer, character)}")
-    return row_picture(context, exhibits, size)
+    return gallery.row(exhibits)
 
 
 def _solvers(character: Character, press: Press) -> dict[str, ArapSolver]:
@@ -76,9 +65,7 @@ def _solvers(character: Character, press: Press) -> dict[str, ArapSolver]:
     }
 
 
-def _balloon(
-    context: moderngl.Context, character: Character, size: tuple[int, int]
-) -> NDArray[np.uint8]:
+def _balloon(gallery: Gallery, character: Character) -> NDArray[np.uint8]:
     """Figure 6: squashed under one constraint on the whole volume, and with ours, kept locally."""
     press = Press.on(character)
     ratio, lean = POSES["squashed"]
@@ -97,7 +84,7 @@ def _balloon(
             kept += f", of its tail {tail:.1%}"
         print(f"figure 6  {character.name}, {name}: {kept}")
         exhibits.append(Exhibit(character, answer, press.handles, name))
-    return row_picture(context, exhibits, size)
+    return gallery.row(exhibits)
 
 
 def _kept(answer: Floats, character: Character) -> str:

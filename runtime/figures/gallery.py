@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from types import TracebackType
 
 import numpy as np
 from numpy.typing import NDArray
 
 from runtime.character import Character
 from runtime.render.camera import front_camera
+from runtime.render.context import headless_context, release_headless
 from runtime.render.stage import Stage
 from solvers.laplacian import Floats, Ints
-
-if TYPE_CHECKING:
-    import moderngl
 
 _GAP = 0.16  # metres between two of a row
 _HANDLE_COLOUR = (0.05, 0.5, 0.12, 1.0)
@@ -43,19 +41,39 @@ class Exhibit:
         )
 
 
-def row_picture(
-    context: moderngl.Context, exhibits: Sequence[Exhibit], size: tuple[int, int]
-) -> NDArray[np.uint8]:
-    """A picture (H, W, 4) of exhibits in a row, on one floor and at one scale."""
-    stage = Stage(context, size)
-    try:
-        right = 0.0
-        for exhibit in exhibits:
-            low, high = exhibit.vertices[:, 0].min(), exhibit.vertices[:, 0].max()
-            place = (right - float(low), 0.0, 0.0)
-            stage.add(exhibit.as_character(), position=place, caption=exhibit.caption)
-            right += float(high - low) + _GAP
-        stage.draw(front_camera().frame(stage.boxes, stage.aspect, margin=0.06))
-        return stage.read()
-    finally:
-        stage.release()
+class Gallery:
+    """Draws rows of exhibits without a window; to be used in a `with` statement.
+
+    Raises:
+        InputError: nothing can be drawn here.
+    """
+
+    def __init__(self, size: tuple[int, int]) -> None:
+        self._size = size
+        self._context = headless_context()
+
+    def __enter__(self) -> Gallery:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        release_headless(self._context)
+
+    def row(self, exhibits: Sequence[Exhibit]) -> NDArray[np.uint8]:
+        """A picture (H, W, 4) of exhibits in a row, on one floor and at one scale."""
+        stage = Stage(self._context, self._size)
+        try:
+            right = 0.0
+            for exhibit in exhibits:
+                low, high = exhibit.vertices[:, 0].min(), exhibit.vertices[:, 0].max()
+                place = (right - float(low), 0.0, 0.0)
+                stage.add(exhibit.as_character(), position=place, caption=exhibit.caption)
+                right += float(high - low) + _GAP
+            stage.draw(front_camera().frame(stage.boxes, stage.aspect, margin=0.06))
+            return stage.read()
+        finally:
+            stage.release()
