@@ -32,7 +32,6 @@ from solvers.held_system import HeldSystem, Hold
 from solvers.laplacian import Floats, Ints
 from solvers.rotation_fit import SCRATCH
 from solvers.rotation_priors import (
-    NO_PRIORS,
     SMOOTHNESS,
     RotationPriors,
     fit_cells_near,
@@ -46,6 +45,13 @@ ENERGIES = (SPOKES, SPOKES_AND_RIMS, SMOOTH_ROTATIONS)
 # of the character's size.
 _JUMP_ANGLE = math.radians(30.0)
 _JUMP_PATH = 0.1
+
+# Small steps add up: while the handles move, the rest pose is tried every so many frames. A group
+# that turned or went less than this (radians, sizes) stood still.
+_CHECKED = 8
+_STILL = 1e-4
+
+_NO_TURN = np.eye(3).ravel()
 
 # The rest pose must start this much nearer to rigid before it takes the last answer's place.
 _BETTER = 0.9
@@ -96,7 +102,9 @@ class ArapSolver:
         self._priors = RotationPriors(
             self._mesh, self._rest, smoothing if energy == SMOOTH_ROTATIONS else 0.0
         )
-        self._R = np.tile(np.eye(3).ravel(), (count, 1))
+        self._R = np.tile(_NO_TURN, (count, 1))
+        self._R_aside = self._R.copy()
+        self._frames_since, self._has_moved = 0, False
         self._laplace_x = np.empty((count, 3))
         self._residual = np.empty((count, 3))
         self._room = np.empty((most_threads(), SCRATCH))
@@ -178,7 +186,8 @@ class ArapSolver:
     def reset(self) -> None:
         """Forget the last answer: the next solve starts from the rest pose."""
         self._x[:] = self._rest
-        self._R[:] = np.eye(3).ravel()
+        self._R[:] = _NO_TURN
+        self._frames_since, self._has_moved = 0, False
         self._goals = self._x[self._handles.places]
 
     def solve(
@@ -213,8 +222,7 @@ class ArapSolver:
     def energy(self) -> float:
         """The energy of the last answer under its best rotations, in the vertices' unit squared."""
         rotations = self._R.copy()
-        self._local_step(self._x)
-        energy = self._sum_terms(self._x) + self._priors.energy(self._R)
+        energy = self._energy_of(self._x)
         self._R[:] = rotations
         return energy * self._frame.size**2
 
@@ -248,7 +256,7 @@ class ArapSolver:
 
     def _move_along(self, goals: Floats) -> None:
         """Put the start of this frame's iterations into x: hard handles at their goals, (H, 3)."""
-        handles, following = self._handles, self._following
+        following = self._following
         following.advance()
         step = following.motions(self._goals, goals)
         angle, path = farthest_motion(step, self._goals, following.known)
@@ -257,14 +265,30 @@ class ArapSolver:
             turn_along(self._R, following.influences, step)
         self._goals = goals
         self._put_held(goals, self._x)
-        if angle > _JUMP_ANGLE or path > _JUMP_PATH:
-            whole = following.motions(self._rest[handles.places], goals)
-            follow(self._rest, following.influences, whole, self._from_rest)
-            self._put_held(goals, self._from_rest)
-            if self._energy_of(self._from_rest) < _BETTER * self._energy_of(self._x):
-                self._x[:] = self._from_rest
-                if self._priors.is_on:
-                    self._fit(self._x, NO_PRIORS)
+        self._frames_since += 1
+        self._has_moved |= angle > _STILL or path > _STILL
+        is_due = self._has_moved and self._frames_since >= _CHECKED
+        if angle > _JUMP_ANGLE or path > _JUMP_PATH or is_due:
+            self._frames_since, self._has_moved = 0, False
+            self._try_from_rest(goals)
+
+    def _try_from_rest(self, goals: Floats) -> None:
+        """Start from the rest pose, moved along, if it is nearer to rigid than x is."""
+        following, ties = self._following, self._priors.is_on
+        whole = following.motions(self._rest[self._handles.places], goals)
+        follow(self._rest, following.influences, whole, self._from_rest)
+        self._put_held(goals, self._from_rest)
+        if ties:  # rotations that depend on each other move along with their positions
+            self._R, self._R_aside = self._R_aside, self._R
+            self._R[:] = _NO_TURN
+            turn_along(self._R, following.influences, whole)
+        fresh = self._energy_of(self._from_rest)
+        if ties:
+            self._R, self._R_aside = self._R_aside, self._R
+        if fresh < _BETTER * self._energy_of(self._x):
+            self._x[:] = self._from_rest
+            if ties:
+                self._R, self._R_aside = self._R_aside, self._R
 
     def _put_held(self, goals: Floats, x: Floats) -> None:
         """Put what is not free into x: hard handles at their goals, carried parts beside theirs."""
@@ -278,9 +302,9 @@ class ArapSolver:
             x[self._carried] = moved
 
     def _energy_of(self, x: Floats) -> float:
-        """The energy of x alone, whatever else its rotations are asked for."""
-        self._fit(x, NO_PRIORS)
-        return self._sum_terms(x)
+        """The energy of x and of the rotations that the next local step finds for it."""
+        self._local_step(x)
+        return self._sum_terms(x) + self._priors.energy(self._R)
 
     def _sum_terms(self, x: Floats) -> float:
         energy_terms(x, self._R, self._rest, self._mesh.terms, self._energy_terms)

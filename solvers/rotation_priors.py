@@ -83,6 +83,7 @@ class RotationPriors:
         self._rigid_masses = np.zeros(0)
         self._Q = np.zeros((0, 9))
         self._room: Floats = NO_PRIORS
+        self._terms = np.zeros(0)
 
     @property
     def is_on(self) -> bool:
@@ -125,15 +126,16 @@ class RotationPriors:
     def energy(self, R: Floats) -> float:
         """What the terms add to the energy of a surface whose cells are turned by R (N, 9)."""
         total = 0.0
-        terms = np.empty(len(R))
+        if self.is_on and len(self._terms) != len(R):
+            self._terms = np.empty(len(R))
         if self._smoothing > 0.0:
-            roughness(R, self._cells, terms)
-            total += self._smoothing * float(terms.sum())
+            roughness(R, self._cells, self._terms)
+            total += self._smoothing * float(self._terms.sum())
         if self._is_stiff:
             regions, masses = self._stiff
             nearest_rotations(R, regions, masses, self._Q)
-            squares = ((R - self._Q[regions.of_cell]) ** 2).sum(axis=1)
-            total += self._kappa * self._sharing * float((masses * squares).sum())
+            unevenness(R, self._Q, regions.of_cell, masses, self._terms)
+            total += self._kappa * self._sharing * float(self._terms.sum())
         return total
 
     @property
@@ -267,6 +269,17 @@ def add_region_priors(
         weight, region = kappa * rigid_masses[i], region_of[i]
         for entry in range(9):
             out[i, entry] += weight * Q[region, entry]
+
+
+@parallel_kernel
+def unevenness(R: Floats, Q: Floats, region_of: Ints, rigid_masses: Floats, out: Floats) -> None:
+    """What each cell's rotation costs that is not its region's, out (N,): its mass |R_k - Q|^2."""
+    for i in prange(len(R)):
+        square, region = 0.0, region_of[i]
+        for entry in range(9):
+            difference = R[i, entry] - Q[region, entry]
+            square += difference * difference
+        out[i] = rigid_masses[i] * square
 
 
 @parallel_kernel
