@@ -18,6 +18,7 @@ WAIT = 0.1  # [s] after which the reader looks whether it is closed
 SLICE = 0.004  # [s] of work without a pause after which the reader pauses for as long
 IDLE = 0.0002  # [s] of waiting for a datagram that count as a pause
 PORTS_TO_TRY = 20
+_AT_ONCE = getattr(socket, "MSG_DONTWAIT", 0)
 _OVERFLOW = 40  # Linux: SO_RXQ_OVFL, each datagram comes with how many were lost before it
 
 
@@ -81,6 +82,13 @@ class UdpTransport:
             if worked > SLICE:
                 self._closing.wait(worked)
                 worked, since = 0.0, time.monotonic()
+
+    def send(self, data: bytes, target: tuple[str, int]) -> bool:
+        """Send one datagram from the bound port, without waiting; whether the system took it."""
+        try:
+            return self._socket.sendto(data, _AT_ONCE, target) == len(data)
+        except (OSError, OverflowError):
+            return False
 
     def close(self) -> None:
         """Give the port back; may be called twice."""

@@ -112,6 +112,16 @@ def host_port(text: str) -> tuple[str, int | None]:
     return host, int(port) if colon else None
 
 
+def remote_address(text: str) -> tuple[str, int | None]:
+    """A host and a port to be run from; ``osc://`` before them is no harm."""
+    return host_port(text.removeprefix("osc://"))
+
+
+def port_number(text: str) -> int:
+    """A port from 1 to 65535."""
+    return host_port(f"host:{text}")[1] or 0
+
+
 class _Parser(argparse.ArgumentParser):
     """Answers bad arguments with the one line that every command answers bad input with."""
 
@@ -138,6 +148,18 @@ def _add_show_options(parser: argparse.ArgumentParser) -> None:
     )
     show.add_argument(
         "--plain", action="store_true", help="without the matched chains and the mirror"
+    )
+    show.add_argument(
+        "--remote",
+        type=remote_address,
+        metavar="HOST:PORT",
+        help="let OSC run the show, as in 127.0.0.1:9100, or 0.0.0.0:9100 for a phone",
+    )
+    show.add_argument(
+        "--remote-feedback",
+        type=port_number,
+        metavar="PORT",
+        help="where the phone listens; the port that it sends from if absent",
     )
     _add_conditioning(parser)
     match = parser.add_argument_group("who drives what")

@@ -4,35 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from devices.stream import SkeletonStream
-from replay.player import Player
-from runtime.conditioning.switches import Conditioning, filled_only
-from runtime.ensemble import Cues
+from runtime.actions import ACTIONS, Desk
 from runtime.theatre import Theatre
 from runtime.window import Event, KeyPressed, Resized, Window
 
 KEYS = {
-    "m": "match again: strike a pose, the best match is shown",
-    "enter": "accept the match shown; the pose is the rest state",
-    "right": "the next match",
-    "left": "the match before",
-    "space": "hold or go on (a recording)",
-    "home": "back to the start (a recording)",
-    "f": "frame every character",
-    "h": "show or hide the matched chains",
-    "c": "calibrate: the pose is the rest state, floor and sizes are measured anew",
-    "x": "mirror, on or off",
-    "s": "smoothing, on or off",
-    "p": "prediction, on or off",
-    "o": "the gate for outliers, on or off",
-    "w": "putting swapped limbs right, on or off",
-    "i": "steady identities, on or off",
-    "l": "levelling the floor, on or off",
-    "z": "one size for all performers, on or off",
-    "k": "calibrating by a T or A pose that is held, on or off",
-    "escape": "leave",
-}
-SWITCH_OF_KEY = {
+    "m": "match-again",
+    "enter": "accept",
+    "right": "next-match",
+    "left": "previous-match",
+    "space": "hold",
+    "home": "home",
+    "f": "frame-all",
+    "h": "chains",
+    "c": "calibrate",
     "x": "mirror",
     "s": "filter",
     "p": "predict",
@@ -42,38 +27,46 @@ SWITCH_OF_KEY = {
     "l": "level",
     "z": "scale",
     "k": "recalibrate",
+    "j": "order",
+    "t": "rest-pose",
+    "r": "record",
+    "e": "freeze",
+    "b": "blackout",
+    "up": "cartoon-up",
+    "down": "cartoon-down",
+    "page-up": "volume-up",
+    "page-down": "volume-down",
+    ".": "stiffness-up",
+    ",": "stiffness-down",
+    "escape": "leave",
 }
+"""The action of each key."""
 
 
 class Controls:
     """Lets the window's keys and mouse steer the show.
 
-    Attributes:
-        leaving: whether it is time to go.
+    Args:
+        window: whose keys and mouse.
+        theatre: what is seen in it.
+        desk: what the keys' actions act upon.
     """
 
-    def __init__(
-        self,
-        window: Window,
-        theatre: Theatre,
-        director: Cues,
-        stream: SkeletonStream,
-        conditioning: Conditioning | None = None,
-    ) -> None:
-        self.leaving = False
+    def __init__(self, window: Window, theatre: Theatre, desk: Desk) -> None:
         self._window = window
         self._theatre = theatre
-        self._director = director
-        self._stream = stream
-        self._conditioning = conditioning or filled_only()
-        window.camera = theatre.camera
+        self._desk = desk
+        self._camera = window.camera = theatre.camera
 
     def serve(self) -> None:
         """Do what was asked since the last tick."""
-        for event in self._window.poll():
+        events = self._window.poll()
+        if self._theatre.camera is self._camera:
+            self._theatre.camera = self._window.camera
+        for event in events:
             self._obey(event)
-        self._theatre.camera = self._window.camera
-        self.leaving = self.leaving or self._window.should_close
+        self._camera = self._window.camera = self._theatre.camera
+        self._desk.leaving = self._desk.leaving or self._window.should_close
 
     def present(self) -> None:
         """Show the newest picture in the window."""
@@ -83,41 +76,13 @@ class Controls:
     def _obey(self, event: Event) -> None:
         if isinstance(event, Resized):
             self._theatre.stage.resize(event.size)
-        elif isinstance(event, KeyPressed):
-            self._press(event.key)
-
-    def _press(self, key: str) -> None:
-        if key == "m":
-            self._director.match_again()
-        elif key == "enter" and self._director.matching:
-            self._director.accept()
-        elif key == "right":
-            self._director.next_match()
-        elif key == "left":
-            self._director.previous_match()
-        elif key == "f":
-            self._theatre.frame_all()
-            self._window.camera = self._theatre.camera
-        elif key == "h":
-            self._theatre.highlights = not self._theatre.highlights
-        elif key == "c":
-            self._director.calibrate()
-        elif key in SWITCH_OF_KEY:
-            self._conditioning.switch(SWITCH_OF_KEY[key])
-        elif key == "escape":
-            self.leaving = True
-        elif isinstance(self._stream, Player):
-            self._press_on_recording(key, self._stream)
-
-    def _press_on_recording(self, key: str, player: Player) -> None:
-        if key == "home":
-            player.seek(0.0)
-        elif key == "space" and player.paused:
-            player.resume()
-        elif key == "space":
-            player.pause()
+        elif isinstance(event, KeyPressed) and event.key in KEYS:
+            action = ACTIONS[KEYS[event.key]]
+            is_switch = action.write is not None  # not turned over and over by a key held down
+            if action.press is not None and not (event.again and is_switch):
+                action.press(self._desk)
 
 
 def key_help() -> Sequence[str]:
     """A line for each key."""
-    return [f"{key:<8}{text}" for key, text in KEYS.items()]
+    return [f"{key:<10}{ACTIONS[name].text}" for key, name in KEYS.items()]

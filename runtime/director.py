@@ -180,6 +180,10 @@ class Director:
             puppet.take(puppet.mapping, rest, self._view(), body)
         self.matching = False
 
+    def take_rest(self) -> None:
+        """Take the pose just struck as the rest state, whether a match is looked for or not."""
+        self.accept()
+
     def calibrate(self) -> None:
         """Take the pose just struck as the rest state, and measure floor and sizes anew."""
         self._performer.recalibrate()

@@ -38,6 +38,10 @@ class Cues(Protocol):
         """Let the matches shown perform; the pose just struck is the rest state."""
         ...
 
+    def take_rest(self) -> None:
+        """Take the pose just struck as the rest state."""
+        ...
+
     def calibrate(self) -> None:
         """Take the pose just struck as the rest state, and measure floor and sizes anew."""
         ...
@@ -71,6 +75,11 @@ class Ensemble:
         for director in self._directors:
             if director.matching:
                 director.accept()
+
+    def take_rest(self) -> None:
+        """See `Director.take_rest`."""
+        for director in self._directors:
+            director.take_rest()
 
     def calibrate(self) -> None:
         """See `Director.calibrate`."""

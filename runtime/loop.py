@@ -7,7 +7,8 @@ and of GL while a performance runs.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 
 from devices.skeleton import SkeletonFrame
 from devices.stream import SkeletonStream
@@ -17,7 +18,7 @@ from runtime.conditioning.switches import Conditioning, filled_only
 from runtime.director import Director
 from runtime.ensemble import Act
 from runtime.lead import Lead
-from runtime.output.output import Output, PerformedFrame
+from runtime.output.output import Output, PerformedFrame, Screen
 from runtime.output.report import Report
 from runtime.performer import Performer, Pose
 from runtime.puppet import Motion, Puppet
@@ -41,8 +42,11 @@ class FrameLoop:
             their puppets after these.
         conditioning: how the stream is put in order; as it comes where None.
         shown: whether somebody looks, so that every tick is drawn.
+        clock: host monotonic time [s].
 
     Attributes:
+        frozen: whether the characters hold still, while frames go on to come, to be recorded and
+            to be published.
         frames: frames performed so far.
         received: frames that came so far.
         seconds: performer's time from the first of them to the last [s].
@@ -61,7 +65,9 @@ class FrameLoop:
         others: Sequence[Act] = (),
         conditioning: Conditioning | None = None,
         shown: bool = False,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
+        self.frozen = False
         self.frames = self.received = 0
         self.seconds = 0.0
         self._began = float("nan")
@@ -73,7 +79,9 @@ class FrameLoop:
         self._shown = shown
         rate = max((o.pictures_a_second for kept in outputs for o in kept), default=0.0)
         self._picture_step = EARLY / rate if rate > 0.0 else math.inf  # [s]
-        self._pictured = -math.inf
+        self._screens = [o for kept in outputs for o in kept if isinstance(o, Screen)]
+        self._pictured = self._pictured_at = -math.inf
+        self._clock = clock
         self._reception = Reception(stream.skeleton, conditioning or filled_only())
         self._lead = Lead(len(self._acts))
         self._timer = StageTimer()
@@ -92,12 +100,23 @@ class FrameLoop:
                 newest, parts = self._receive()
             if newest is not None:
                 self._perform(newest, parts)
-            elif self._shown and self._theatre is not None:
-                self._theatre.show(self._poses[0], self._motions)
+            else:
+                self._idle()
         if newest is not None:
             for stage, spent in self._timer.stages.items():
                 self._report.times.add(stage, spent)
         return newest is not None
+
+    def _idle(self) -> None:
+        """Go on showing what there is, though no frame has come: camera and light may change."""
+        due = self._clock() - self._pictured_at >= self._picture_step
+        if self._theatre is not None and (self._shown or (due and self._screens)):
+            self._theatre.show(self._poses[0], self._motions)
+            if due and self._screens:
+                picture = self._theatre.picture()
+                self._pictured_at = self._clock()
+                for screen in self._screens:
+                    screen.show(picture)
 
     def _receive(self) -> tuple[SkeletonFrame | None, dict[int, SkeletonFrame]]:
         """The newest frame, and that of each part."""
@@ -122,7 +141,10 @@ class FrameLoop:
                     self._poses[part] = act.performer.follow(parts[part])
                     if act.performer.calibrates:
                         act.director.calibrate()
-                    act.director.direct(parts[part])
+                    if not self.frozen:
+                        act.director.direct(parts[part])
+            if self.frozen:
+                continue
             pose = self._poses[part]
             for puppet in act.puppets:
                 with timer.stage("retarget"):
@@ -130,27 +152,28 @@ class FrameLoop:
                         puppet.follow(pose)
                 with timer.stage("deform"):
                     motions.append(puppet.deform())
-        self._motions = motions
+        if not self.frozen:
+            self._motions = motions
         self._publish(frame.time)
         self._began = frame.time if self.frames == 0 else self._began
         self.seconds = frame.time - self._began
         self.frames += 1
 
-    def _publish(self, time: float) -> None:
+    def _publish(self, at: float) -> None:
         step = self._picture_step
-        wanted = math.isfinite(step) and time - self._pictured >= step
+        wanted = math.isfinite(step) and at - self._pictured >= step
         picture = None
         with self._timer.stage("render"):
             if self._theatre is not None and (self._shown or wanted):
                 self._theatre.show(self._poses[0], self._motions)
             if self._theatre is not None and wanted:
                 picture = self._theatre.picture()
-                self._pictured = time
+                self._pictured, self._pictured_at = at, self._clock()
         with self._timer.stage("publish"):
             for motion, kept in zip(self._motions, self._outputs, strict=True):
                 performed = PerformedFrame(
                     index=self.frames,
-                    time=time,
+                    time=at,
                     vertices=motion.vertices,
                     node_positions=motion.node_positions,
                     node_rotations=motion.node_rotations,

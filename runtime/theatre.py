@@ -37,7 +37,7 @@ class Theatre:
         size: width and height of the picture [px].
         puppets: who is on stage, from left to right.
         performer: the skeleton shown in the mirror.
-        background: what is there instead of house and floor; then it is plain, too.
+        background: what is there instead of house and floor; then it is plain, and without names.
         plain: neither the matched chains nor the mirror.
         clock: host monotonic time [s].
 
@@ -62,7 +62,7 @@ class Theatre:
         self.blackout = Fade(BLACKOUT, clock)
         self.stage = Stage(context, size, background=background)
         self._puppets = puppets
-        self._captions = len(puppets) > 1
+        self._captions = len(puppets) > 1 and background is None
         places = _side_by_side([puppet.character for puppet in puppets])
         self._actors = [
             self.stage.add(

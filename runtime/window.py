@@ -33,11 +33,13 @@ class KeyPressed:
     Attributes:
         key: what is printed on it in lower case, or one of the names in `KEY_NAMES`.
         shift, control: whether that modifier was held.
+        again: whether it was down already, and repeats.
     """
 
     key: str
     shift: bool = False
     control: bool = False
+    again: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -159,7 +161,8 @@ class Window:
         name = KEY_NAMES.get(key) or glfw.get_key_name(key, scancode)
         if name:
             shift, control = bool(mods & glfw.MOD_SHIFT), bool(mods & glfw.MOD_CONTROL)
-            self._events.append(KeyPressed(name.lower(), shift, control))
+            again = action == glfw.REPEAT
+            self._events.append(KeyPressed(name.lower(), shift, control, again))
 
     def _on_button(self, _: object, button: int, action: int, mods: int) -> None:
         if action == glfw.RELEASE:

@@ -22,6 +22,7 @@ from replay.player import EveryFrame, Player, RealTime
 from replay.recorded_stream import RecordedStream
 from replay.recorder import Recorder
 from replay.recording import Recording
+from runtime.actions import Desk
 from runtime.cast import character_named
 from runtime.character import Character
 from runtime.characters.builtin import BUILTIN
@@ -40,10 +41,12 @@ from runtime.progress import Progress
 from runtime.provenance import provenance
 from runtime.puppet import Puppet
 from runtime.rehearsal import rehearse
+from runtime.remote import PORT, Remote
 from runtime.render.background import NOTHING, Background
 from runtime.render.camera import front_camera
 from runtime.render.context import headless_context, release_headless
 from runtime.skin import Elasticity
+from runtime.takes import Takes
 from runtime.theatre import Theatre
 from runtime.warn import warn
 from runtime.window import Window
@@ -146,6 +149,7 @@ class _Show:
         self._source = source
         self._closing = closing
         self._stream = closing.enter_context(RecordedStream(source.stream))
+        self._remote = self._open_remote()
         usual = for_live() if source.recording is None else for_recording()
         self._conditioning = asked_for(usual, vars(options))
         self._performer = Performer(self._stream.skeleton, options.source, self._conditioning)
@@ -170,15 +174,14 @@ class _Show:
                 self._theatre.frame_all(filled)
         with held():
             loop = self._open_loop()
+            desk = self._open_desk(loop)
         total = None if recording is None or options.loop else len(recording)
         progress = self._closing.enter_context(Progress("performing", total))
         controls = None
         if self._window is not None and self._theatre is not None:
-            played = self._source.stream
-            cues = Ensemble([act.director for act in self._acts])
-            controls = Controls(self._window, self._theatre, cues, played, self._conditioning)
+            controls = Controls(self._window, self._theatre, desk)
         pace = None if options.fast else pace_of(self._source.stream)
-        while not self._stream.ended and not (controls is not None and controls.leaving):
+        while not (self._stream.ended or desk.leaving):
             with held():  # so that all outputs have the same frames
                 performed = loop.tick()
             if performed:
@@ -186,6 +189,8 @@ class _Show:
             if controls is not None:
                 controls.present()
                 controls.serve()
+            if self._remote is not None:
+                self._remote.serve(desk)
             if pace is not None:
                 pace.wait()
 
@@ -211,23 +216,49 @@ class _Show:
             shown=self._window is not None,
         )
         self._closing.callback(self._tell, loop)
-        self._start_recording()
         return loop
 
-    def _start_recording(self) -> None:
-        if self._options.record is None:
-            return
-        recorder = Recorder(
-            self._options.record,
-            self._stream.skeleton,
-            source=provenance(self._source.origin),
-            tell=warn,
+    def _open_desk(self, loop: FrameLoop) -> Desk:
+        """What a puppeteer reaches, by keys or from afar."""
+        return Desk(
+            cues=Ensemble([act.director for act in self._acts]),
+            stream=self._source.stream,
+            conditioning=self._conditioning,
+            loop=loop,
+            skins=[puppet.skin for puppet in self._puppets],
+            takes=self._open_takes(),
+            theatre=self._theatre,
         )
-        self._closing.callback(self._report.kept, recorder)  # once it is closed
-        self._closing.enter_context(recorder)
+
+    def _open_takes(self) -> Takes:
+        """The takes that may be asked for, and the recording that was, which begins at once."""
+        path = self._options.record
         # A recording that waits for the loop can wait for the disk as well, and loses nothing.
         waits = self._options.fast and self._source.recording is not None
-        self._stream.keep = recorder.write if waits else recorder.offer
+        recorder = None
+        if path is not None:
+            recorder = self._open_recorder(path)
+            self._closing.callback(self._report.kept, recorder)  # once it is closed
+        takes = Takes(
+            self._stream, path or Path("take.mcap"), self._open_recorder, tell=warn, waits=waits
+        )
+        self._closing.enter_context(takes)
+        if recorder is not None:
+            takes.record(recorder)
+        return takes
+
+    def _open_recorder(self, path: Path) -> Recorder:
+        source = provenance(self._source.origin)
+        return Recorder(path, self._stream.skeleton, source=source, tell=warn)
+
+    def _open_remote(self) -> Remote | None:
+        """The remote control, if one was asked for."""
+        if self._options.remote is None:
+            return None
+        host, port = self._options.remote
+        answers = self._options.remote_feedback or 0
+        remote = Remote(host, PORT if port is None else port, answer_port=answers, tell=warn)
+        return self._closing.enter_context(remote)
 
     def _open_theatre(self) -> Theatre | None:
         """The house, if anybody looks."""

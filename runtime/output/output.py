@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol, Self
+from typing import Protocol, Self, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,3 +57,12 @@ class Output(Protocol):
     def __enter__(self) -> Self: ...
 
     def __exit__(self, *exc: object) -> None: ...
+
+
+@runtime_checkable
+class Screen(Protocol):
+    """An output for viewers elsewhere, who see a picture also while no performer is seen."""
+
+    def show(self, picture: NDArray[np.uint8]) -> None:
+        """Show a picture, (H, W, 4) uint8 sRGB with straight alpha, top row first."""
+        ...

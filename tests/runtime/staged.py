@@ -1,0 +1,121 @@
+"""A whole show in a test's hands: all of it the real thing but the clock and the window."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Self
+
+import moderngl
+from numpy.typing import NDArray
+
+from devices.simulator import Simulator
+from replay.player import Player
+from replay.recorded_stream import RecordedStream
+from replay.recorder import Recorder
+from runtime.actions import Desk
+from runtime.conditioning.switches import Conditioning
+from runtime.director import Choices, Director
+from runtime.loop import FrameLoop
+from runtime.mapping import Mapping
+from runtime.output.output import PerformedFrame
+from runtime.output.report import Report
+from runtime.performer import Performer
+from runtime.puppet import Puppet
+from runtime.skin import Elasticity
+from runtime.takes import Takes
+from runtime.theatre import Theatre
+from tests.runtime.figures import BODY, FRONT_VIEW, T_POSE, frame, pose
+
+SIZE = (64, 36)
+
+
+class Seen:
+    """An output that keeps vertices and pictures in memory."""
+
+    pictures_a_second = math.inf
+
+    def __init__(self) -> None:
+        self.vertices: list[NDArray] = []
+        self.pictures: list[NDArray] = []
+
+    def write(self, frame: PerformedFrame) -> None:
+        self.vertices.append(frame.vertices.copy())
+        if frame.picture is not None:
+            self.pictures.append(frame.picture)
+
+    def close(self) -> None: ...
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None: ...
+
+
+class Show:
+    """One puppet and one performer, who may be a recording or the simulator.
+
+    Attributes:
+        now: what the clock of the lights says [s].
+        told: lines for whoever runs the show.
+    """
+
+    def __init__(
+        self,
+        context: moderngl.Context,
+        puppet: Puppet,
+        stream: Player | Simulator,
+        folder: Path,
+    ) -> None:
+        puppet.rest()
+        puppet.show(Mapping(()))
+        puppet.skin.elasticity = Elasticity()
+        puppet.skin.reset()
+        self.now = 0.0
+        self.told: list[str] = []
+        self.seen = Seen()
+        self.puppet = puppet
+        self.stream = stream
+        recorded = RecordedStream(stream)
+        self.performer = Performer(BODY)
+        self.director = Director(
+            self.performer, [puppet], lambda: FRONT_VIEW, Choices(patience=math.inf), [None]
+        )
+        self.theatre = Theatre(context, SIZE, [puppet], BODY, clock=lambda: self.now)
+        self.switches = Conditioning()
+        self.loop = FrameLoop(
+            recorded,
+            self.performer,
+            [puppet],
+            director=self.director,
+            report=Report(None),
+            theatre=self.theatre,
+            outputs=[[self.seen]],
+        )
+        self.takes = Takes(
+            recorded,
+            folder / "out.mcap",
+            lambda path: Recorder(path, BODY, tell=self.told.append),
+            tell=self.told.append,
+            waits=True,
+        )
+        self.desk = Desk(
+            cues=self.director,
+            stream=stream,
+            conditioning=self.switches,
+            loop=self.loop,
+            skins=[puppet.skin],
+            takes=self.takes,
+            theatre=self.theatre,
+        )
+
+    def close(self) -> None:
+        self.takes.close()
+        self.theatre.close()
+
+    def strike(self, time: float = 0.0) -> Mapping:
+        """Let the performer stand in a T pose for a moment; the mapping that is shown."""
+        captured = frame(pose(T_POSE), time)
+        self.performer.follow(captured)
+        self.director.direct(captured)
+        return self.puppet.mapping
