@@ -27,6 +27,7 @@ class UdpTransport:
 
     The reader takes at most half of one core's time: when datagrams come faster than they are
     decoded, it pauses as long as it has worked, and the kernel drops what its queue cannot keep.
+    Time that it waits for a busy core does not count as work.
 
     Args:
         host: a name or an address of this machine.
@@ -62,9 +63,10 @@ class UdpTransport:
 
     def run(self, deliver: Deliver) -> None:
         """Deliver every datagram with its arrival and sender's address until it is closed."""
-        worked, since = 0.0, time.monotonic()
+        worked, since = 0.0, time.thread_time()
         while not self._closing.is_set():
             asked = time.monotonic()
+            worked, since = worked + time.thread_time() - since, time.thread_time()
             try:
                 data, source = self._receive()
             except TimeoutError:
@@ -76,12 +78,11 @@ class UdpTransport:
                     return
                 raise
             arrival = time.monotonic()
-            worked = 0.0 if arrival - asked > IDLE else worked + (asked - since)
-            since = arrival
+            worked = 0.0 if arrival - asked > IDLE else worked
             deliver(data, arrival, source)
             if worked > SLICE:
                 self._closing.wait(worked)
-                worked, since = 0.0, time.monotonic()
+                worked = 0.0
 
     def send(self, data: bytes, target: tuple[str, int]) -> bool:
         """Send one datagram from the bound port, without waiting; whether the system took it."""

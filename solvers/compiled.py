@@ -28,12 +28,14 @@ def kernel(function: _Function) -> _Function:
     """Compile a function ahead of its second run: cached on disk, reductions may be reordered.
 
     The order is fixed when the code is compiled, so that two runs still agree to the last bit.
-    NaN and infinity keep their meaning.
+    NaN and infinity keep their meaning. Other threads go on meanwhile: a device's must stamp what
+    arrives when it arrives.
     """
     return cast(
         _Function,
         numba.njit(
             cache=True,
+            nogil=True,
             error_model="numpy",
             fastmath={"reassoc", "contract", "nsz", "arcp"},
             boundscheck=False,
@@ -51,6 +53,7 @@ def parallel_kernel(function: _Function) -> _Function:
         _Function,
         numba.njit(
             cache=True,
+            nogil=True,
             parallel=True,
             error_model="numpy",
             fastmath={"reassoc", "contract", "nsz", "arcp"},

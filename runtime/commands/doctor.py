@@ -10,6 +10,8 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
+
 from devices.errors import InputError
 from replay.builtin import builtin_recording
 from replay.player import EveryFrame, Player
@@ -23,6 +25,7 @@ from runtime.output.video import encoder_for
 from runtime.performer import Performer
 from runtime.puppet import Puppet
 from runtime.render.context import headless_context, is_software, release_headless, renderer_name
+from runtime.skin import Elasticity
 from runtime.theatre import Theatre
 
 EXTRAS = {
@@ -115,6 +118,9 @@ def _warm() -> None:
     performer = Performer(recording.skeleton)
     puppets = [Puppet(builtin_character(name)) for name in BUILTIN]
     proxy_of(puppets[0].character, dense=0, count=1_000)  # as for a dense character
+    puppets[0].skin.elasticity = Elasticity(cartoon=1.0, volume_gain=1.5, stiffness=0.5)
+    anchors = len(puppets[1].binding.node)
+    puppets[1].skin.weigh(np.ones(anchors))  # as of a limb that lets go
     context = headless_context()
     theatre = Theatre(context, (320, 180), puppets, recording.skeleton)
     report = Report(None)
