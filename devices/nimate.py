@@ -105,6 +105,7 @@ class NimateDecoder:
         """Kinect's joints where only such come, else OpenNI's."""
         return KINECT_V2 if self._kinect else OPENNI
 
+    @np.errstate(over="ignore", invalid="ignore")  # whatever a damaged packet holds
     def feed(self, data: bytes, arrival: float) -> Sequence[SkeletonFrame]:
         """The frames that a datagram, which came at `arrival` [s], completes."""
         repeated = data == self._last[0] and arrival - self._last[1] < AGAIN

@@ -87,6 +87,7 @@ _SIDED = {
 }
 _WORDS = {"wrist": "Wrist", "ankle": "Ankle", "fingertip": "HandTip", "thumb": "Thumb"}
 _WAIST = "waist"
+_AROUND = re.compile(r"skeleton|joints?|/", re.IGNORECASE)  # what programs write around a name
 _COLLARS = {"collar", "clavicle", "collarbone"}
 
 
@@ -101,7 +102,7 @@ def joint_called(name: str) -> int | None:
     """The index in KINECT_V2 of the joint that a name or an address stands for; None if none."""
     if len(name) > LONGEST_NAME:
         return None
-    part = part_of_name(name.replace("/", "_"))
+    part = part_of_name(_AROUND.sub("_", name).strip("_"))
     if part is None or part.word in _COLLARS:
         return None
     if part.side is Side.CENTRE:

@@ -36,6 +36,7 @@ MOST_ACTORS = 16
 LONGEST_NAME = 256
 FARTHEST = 1000.0  # [m] or a position is not believed
 AGAIN = 0.004  # [s] within which the same datagram is the network's doing, not the sender's
+MOST_OVERTAKEN = 2  # scenes in a row
 _MAGIC = b"\x04\x22\x4d\x18"
 
 
@@ -54,8 +55,10 @@ class RokokoDecoder:
         self._numbers: OrderedDict[str, int] = OrderedDict()  # who was seen last comes last
         self._stamp = math.nan
         self._came = -math.inf
+        self._behind = 0  # scenes in a row that were overtaken
         self._last = b""
 
+    @np.errstate(over="ignore", invalid="ignore")  # whatever a damaged packet holds
     def feed(self, data: bytes, arrival: float) -> Sequence[SkeletonFrame]:
         """A frame of each actor in a datagram that came at `arrival` [s]."""
         scene = _scene(data)
@@ -63,8 +66,8 @@ class RokokoDecoder:
             self.refused += 1
             return ()
         stamp = _number(scene.get("timestamp"))
-        if 0.0 < self._stamp - stamp <= STEP_BACK and arrival - self._came < STEP_BACK:
-            self.refused += 1  # overtaken by a newer one
+        if self._overtaken(stamp, arrival):
+            self.refused += 1
             return ()
         # A clock that stands (a clip that is paused, a sender without one) tells nothing.
         time = self._clock.host_time(math.nan if stamp == self._stamp else stamp, arrival)
@@ -82,6 +85,12 @@ class RokokoDecoder:
 
     def _repeated(self, data: bytes, arrival: float) -> bool:
         return data == self._last and arrival - self._came < AGAIN
+
+    def _overtaken(self, stamp: float, arrival: float) -> bool:
+        """Whether a newer scene came before, just now; several in a row are a clip that loops."""
+        late = 0.0 < self._stamp - stamp <= STEP_BACK and arrival - self._came < STEP_BACK
+        self._behind = self._behind + 1 if late else 0
+        return 0 < self._behind <= MOST_OVERTAKEN
 
     def _frame(self, actor: Any, time: float, arrival: float) -> SkeletonFrame | None:
         """An actor's frame; None where there is no body, or no name to know it by."""
@@ -113,7 +122,7 @@ class RokokoDecoder:
         positions, rotations = table[:, :3], table[:, 3:]
         near = (np.abs(positions) < FARTHEST).all(axis=1)  # NaN is not
         positions[~near] = np.nan
-        self.refused += sum(name in body for name in np.array(SKELETON.names)[~near])
+        self.refused += sum(SKELETON.names[joint] in body for joint in np.flatnonzero(~near))
         length = np.linalg.norm(rotations, axis=1)
         turned = near & (length > 0.5) & (length < 2.0)
         rotations[turned] /= length[turned, None]

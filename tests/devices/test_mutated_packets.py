@@ -15,9 +15,16 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from devices.kinect_joints import KINECT_V2
+from devices.nimate import NimateDecoder
+from devices.openni_joints import OPENNI
+from devices.rokoko import RokokoDecoder
 from devices.senders import Decoder
 from devices.vmc import PERFORMER, VmcDecoder
 from devices.vrchat import VrchatDecoder
+from devices.xsens import XsensDecoder
+from devices.xsens_segments import xsens_skeleton
+from tests.devices import studio_senders as studio
 from tests.devices.vmc_sender import at, bones, bundle, message, ok, root, slime
 
 MUTATIONS = int(os.environ.get("BUNRAKU_MUTATIONS", "3000"))
@@ -54,10 +61,61 @@ def vrchat_packets() -> list[bytes]:
     return [bundle(said), *(one.dgram for one in said)]
 
 
+def rokoko_packets() -> list[bytes]:
+    actors = {name: studio.bones(studio.posed(studio.ROKOKO) + n) for n, name in enumerate("ABC")}
+    one = {"A": actors["A"]}
+    scenes = [studio.rokoko_v3(one, 1.0), studio.rokoko_v3(actors, 1.1), studio.rokoko_v2(one, 1.2)]
+    return [*map(studio.packed, scenes), studio.plain(scenes[0]), studio.plain(scenes[2])]
+
+
+def xsens_packets() -> list[bytes]:
+    places = studio.posed(studio.XSENS)
+    gloves = studio.posed(xsens_skeleton(fingers=True))
+    return [
+        *(studio.mxtp02(places, counter=k, time_ms=17 * k)[0] for k in (1000, 1001, 70_000)),
+        *studio.mxtp02(gloves, counter=1002, parts=2, who=3),
+        studio.mxtp01(places, counter=1003),
+        studio.mxtp13(),
+    ]
+
+
+def nimate_packets() -> list[bytes]:
+    places = studio.posed(OPENNI) + np.array([0.0, 0.0, -2.0])
+    kinect = studio.posed(KINECT_V2)
+    return [
+        bundle(studio.osceleton(places, 1)),
+        bundle(studio.nimate(places, user=2)),
+        bundle([*studio.nimate(places, shape="/{name}_{user}", user=3), studio.SYNC]),
+        bundle(studio.nimate(places, what="turn", user=4)),
+        bundle(studio.animata(places, 5)),
+        bundle(studio.kinect2(kinect)),
+        studio.skelecaster({7: kinect, 8: kinect + 1.0}),
+        message("skeleton", *([0.5, 1.0, 2.0] * 15)).dgram,
+        bundle([message("/lost_user", 1)]),
+        *(one.dgram for one in studio.nimate(places)[:4]),
+    ]
+
+
+def kinect_packets() -> list[bytes]:
+    said = studio.kinect2(studio.posed(KINECT_V2))
+    return [bundle(said), bundle(said[:9]), *(one.dgram for one in said)]
+
+
+def skelecaster_packets() -> list[bytes]:
+    kinect = studio.posed(KINECT_V2)
+    return [studio.skelecaster({n: kinect + n for n in range(k)}) for k in (1, 2, 6, 0)]
+
+
 DECODERS: dict[str, tuple[Callable[[], Decoder], Callable[[], list[bytes]]]] = {
     "vmc": (VmcDecoder, vmc_packets),
     "vmc performer": (lambda: VmcDecoder(PERFORMER), tracker_packets),
     "vrchat": (VrchatDecoder, vrchat_packets),
+    "nimate": (NimateDecoder, nimate_packets),
+    "nimate kinect2": (lambda: NimateDecoder("kinect2"), kinect_packets),
+    "nimate skelecaster": (lambda: NimateDecoder("skelecaster"), skelecaster_packets),
+    "rokoko": (RokokoDecoder, rokoko_packets),
+    "xsens": (XsensDecoder, xsens_packets),
+    "xsens gloves": (lambda: XsensDecoder(fingers=True), xsens_packets),
 }
 """What each protocol's decoder is, and good packets to damage."""
 
