@@ -53,8 +53,9 @@ _STILL = 1e-4
 
 _NO_TURN = np.eye(3).ravel()
 
-# The rest pose must start this much nearer to rigid before it takes the last answer's place.
-_BETTER = 0.9
+# The rest pose must start this much nearer to rigid before it takes the last answer's place: after
+# a jump, and while all goes its way, when nothing should be seen to snap.
+_BETTER, _MUCH_BETTER = 0.9, 0.5
 
 
 class ArapSolver:
@@ -267,13 +268,13 @@ class ArapSolver:
         self._put_held(goals, self._x)
         self._frames_since += 1
         self._has_moved |= angle > _STILL or path > _STILL
-        is_due = self._has_moved and self._frames_since >= _CHECKED
-        if angle > _JUMP_ANGLE or path > _JUMP_PATH or is_due:
+        has_jumped = angle > _JUMP_ANGLE or path > _JUMP_PATH
+        if has_jumped or (self._has_moved and self._frames_since >= _CHECKED):
             self._frames_since, self._has_moved = 0, False
-            self._try_from_rest(goals)
+            self._try_from_rest(goals, _BETTER if has_jumped else _MUCH_BETTER)
 
-    def _try_from_rest(self, goals: Floats) -> None:
-        """Start from the rest pose, moved along, if it is nearer to rigid than x is."""
+    def _try_from_rest(self, goals: Floats, share: float) -> None:
+        """Start from the rest pose, moved along, if its energy is under a share of that of x."""
         following, ties = self._following, self._priors.is_on
         whole = following.motions(self._rest[self._handles.places], goals)
         follow(self._rest, following.influences, whole, self._from_rest)
@@ -285,7 +286,7 @@ class ArapSolver:
         fresh = self._energy_of(self._from_rest)
         if ties:
             self._R, self._R_aside = self._R_aside, self._R
-        if fresh < _BETTER * self._energy_of(self._x):
+        if fresh < share * self._energy_of(self._x):
             self._x[:] = self._from_rest
             if ties:
                 self._R, self._R_aside = self._R_aside, self._R
