@@ -232,7 +232,7 @@ def _add_show_options(parser: argparse.ArgumentParser) -> None:
     keep = parser.add_argument_group("what is kept")
     keep.add_argument("--video", type=Path, metavar="OUT.mp4")
     keep.add_argument(
-        "--fps", type=positive, default=60.0, metavar="X", help="of the video, at most"
+        "--fps", type=positive, default=60.0, metavar="X", help="of video and cameras, at most"
     )
     keep.add_argument("--frames", type=Path, metavar="DIR", help="a PNG for each frame")
     keep.add_argument("--cache", type=Path, metavar="OUT.pc2", help="deformed vertices, for each")
@@ -243,6 +243,19 @@ def _add_show_options(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="OUT.{glb,usdc,usda,bvh}",
         help="the performed character, for other programs",
+    )
+    keep.add_argument(
+        "--virtual-camera",
+        nargs="?",
+        const="",
+        metavar="NAME",
+        help="pictures to a virtual camera, the first there is if not named",
+    )
+    keep.add_argument("--ndi", metavar="NAME", help="pictures over the network, by NDI")
+    keep.add_argument(
+        "--spout",
+        metavar="NAME",
+        help="pictures for programs on this machine, by Spout (Windows) or Syphon (macOS)",
     )
     keep.add_argument(
         "--vmc",

@@ -29,8 +29,10 @@ MAY_LOAD = {
 }
 GRAPHICS = {"moderngl", "glfw"}
 EXTRAS = {
+    "SpoutGL",
     "av",
     "cv2",
+    "cyndilib",
     "fast_simplification",
     "igl",
     "imgui_bundle",
@@ -39,6 +41,8 @@ EXTRAS = {
     "meshio",
     "pxr",
     "pygel3d",
+    "pyvirtualcam",
+    "syphon",
     "websockets",
 }
 

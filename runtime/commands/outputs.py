@@ -14,16 +14,21 @@ from runtime.character import Character
 from runtime.commands.bridge import open_publisher
 from runtime.output.bridge_performer import BridgePerformer
 from runtime.output.bridge_publisher import Binding, binding
+from runtime.output.broadcast import Broadcast, Sender
 from runtime.output.export import SUFFIXES, open_export
 from runtime.output.frames import Frames
+from runtime.output.ndi import NdiSender, import_cyndilib
 from runtime.output.output import Output
 from runtime.output.point_cache import PointCache
 from runtime.output.report import Part
+from runtime.output.shared_texture import import_shared_texture, open_shared_texture
 from runtime.output.video import Video, encoder_for
+from runtime.output.virtual_camera import VirtualCamera, import_pyvirtualcam
 from runtime.output.vmc_performer import PORT as VMC_PORT
 from runtime.output.vmc_performer import VmcPerformer
 from runtime.output.whole_file import check_suffix, check_writable
 from runtime.performer import Performer
+from runtime.warn import warn
 
 
 def check_outputs(options: argparse.Namespace) -> None:
@@ -39,6 +44,12 @@ def check_outputs(options: argparse.Namespace) -> None:
         check_writable(path / "000000.png" if option == "--frames" and path.is_dir() else path)
     if options.video is not None:
         encoder_for(options.video)
+    if options.virtual_camera is not None:
+        import_pyvirtualcam()
+    if options.spout is not None:
+        import_shared_texture()
+    if options.ndi is not None:
+        import_cyndilib()
     if options.publish is not None:
         _publishing(options)
     if options.export is not None:
@@ -85,6 +96,8 @@ def open_outputs(
         outputs[0].append(closing.enter_context(video))
     if options.frames is not None:
         outputs[0].append(closing.enter_context(Frames(options.frames)))
+    for broadcast in _open_broadcasts(options):
+        outputs[0].append(closing.enter_context(broadcast))
     if options.publish is not None:
         publisher = open_publisher(_publishing(options), performer.skeleton)
         outputs[0].append(closing.enter_context(BridgePerformer(performer, publisher)))
@@ -92,6 +105,29 @@ def open_outputs(
         host, port = options.vmc
         outputs[0].append(closing.enter_context(VmcPerformer(performer, host, port or VMC_PORT)))
     return outputs
+
+
+def needs_pictures(options: argparse.Namespace) -> bool:
+    """Whether anything that a show writes or sends is made of pictures."""
+    asked = (options.video, options.frames, options.virtual_camera, options.spout, options.ndi)
+    return any(option is not None for option in asked)
+
+
+def _open_broadcasts(options: argparse.Namespace) -> Iterator[Broadcast]:
+    """What takes pictures to other programs, each opened as it is asked for."""
+    size, rate = options.size, options.fps
+
+    def broadcast(name: str, sender: Sender) -> Broadcast:
+        return Broadcast(name, sender, size, rate, tell=warn)
+
+    if options.virtual_camera is not None:
+        camera = VirtualCamera(options.virtual_camera, size, rate)
+        yield broadcast("the virtual camera", camera)
+    if options.spout is not None:
+        yield broadcast("the shared picture", open_shared_texture(options.spout, size))
+    if options.ndi is not None:
+        sender = NdiSender(options.ndi, size, rate, alpha=options.transparent)
+        yield broadcast("NDI", sender)
 
 
 def _publishing(options: argparse.Namespace) -> Binding:

@@ -26,7 +26,7 @@ from runtime.actions import Desk
 from runtime.cast import character_named
 from runtime.character import Character
 from runtime.characters.builtin import BUILTIN
-from runtime.commands.outputs import check_outputs, open_outputs
+from runtime.commands.outputs import check_outputs, needs_pictures, open_outputs
 from runtime.conditioning.switches import asked_for, for_live, for_recording
 from runtime.controls import Controls
 from runtime.director import Choices, Director
@@ -264,7 +264,7 @@ class _Show:
         """The house, if anybody looks."""
         if self._window is not None:
             context, size = self._window.context, self._window.size
-        elif self._options.video is not None or self._options.frames is not None:
+        elif needs_pictures(self._options):
             context, size = headless_context(), self._options.size
             self._closing.callback(release_headless, context)
         else:

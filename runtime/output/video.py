@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from devices.errors import InputError
 from runtime.output.output import PerformedFrame
+from runtime.output.pictures import premultiplied
 from runtime.output.video_file import VideoFile
 from runtime.output.whole_file import check_suffix, check_writable, writing
 
@@ -94,7 +95,7 @@ class Video:
             return
         if self._container is None:
             raise ValueError("the video is closed")
-        picture = _even(_opaque(frame.picture))
+        picture = _even(premultiplied(frame.picture))  # on black
         with self._writing():
             if self._stream is None:
                 self._start = frame.time
@@ -209,14 +210,6 @@ def _container_options(av: Any, kind: str) -> dict[str, str]:
     hybrid = av.library_versions["libavformat"] >= (62,)
     flags = "hybrid_fragmented" if hybrid else "frag_keyframe+empty_moov+default_base_moof"
     return {"movflags": flags, "flush_packets": "1"}
-
-
-def _opaque(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """The picture (H, W, 4) as it looks on black."""
-    alpha = picture[..., 3:]
-    if (alpha == 255).all():
-        return picture
-    return ((picture.astype(np.uint16) * alpha + 127) // 255).astype(np.uint8)
 
 
 def _even(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -1,0 +1,66 @@
+"""Pictures over the network by NDI, which OBS, vMix and mixers take as a source, by cyndilib."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from devices.errors import InputError
+from runtime.output.pictures import Picture
+
+
+class NdiSender:
+    """An NDI source of RGBA pictures with straight alpha; without alpha where it has none to show.
+
+    Source: the NDI SDK's documentation of video frames: rows from the top, alpha not
+    premultiplied.
+
+    Args:
+        name: what receivers find it by.
+        size: width and height [px].
+        rate: about how many pictures a second come.
+        alpha: whether anything of the pictures is transparent.
+
+    Raises:
+        InputError: the library is missing, or does not start.
+    """
+
+    def __init__(self, name: str, size: tuple[int, int], rate: float, *, alpha: bool) -> None:
+        library = import_cyndilib()
+        frame = library.VideoSendFrame()
+        frame.set_resolution(*size)
+        frame.set_frame_rate(Fraction(rate).limit_denominator(1001))
+        frame.set_fourcc(library.FourCC.RGBA if alpha else library.FourCC.RGBX)
+        # It would keep the frame rate by making the show wait.
+        self._sender: Any = library.Sender(name, clock_video=False, clock_audio=False)
+        self._sender.set_video_frame(frame)
+        try:
+            self._sender.open()
+        except Exception as error:  # the library raises MemoryError, AttributeError and Exception
+            raise InputError(
+                f"NDI does not start here ({error!r}); another source may be called {name!r}"
+            ) from error
+
+    def send(self, picture: Picture) -> None:
+        """Send a picture (H, W, 4); the library encodes it on its own threads."""
+        self._sender.write_video_async(np.ascontiguousarray(picture).reshape(-1))
+
+    def close(self) -> None:
+        """Be found no more."""
+        self._sender.close()
+
+
+def import_cyndilib() -> Any:
+    """The library.
+
+    Raises:
+        InputError: it is missing, or NDI is not for this machine.
+    """
+    try:
+        import cyndilib  # noqa: PLC0415
+        import cyndilib.wrapper  # noqa: PLC0415
+    except (ImportError, OSError) as error:
+        raise InputError("--ndi needs the extra: pip install 'bunraku[ndi]'") from error
+    return cyndilib
