@@ -32,6 +32,8 @@ EXTRAS = {
     "characters": ("pygel3d", "fast_simplification", "manifold3d"),
     "video": ("av",),
     "usd": ("pxr",),
+    "camera": ("pyvirtualcam",),
+    "ndi": ("cyndilib",),
     "bench": ("igl",),
 }
 WARM_FRAMES = 3
