@@ -15,6 +15,7 @@ from replay.formats import read_recording
 from replay.player import EveryFrame, Player
 from runtime.actions import ACTIONS, MOST
 from runtime.conditioning.switches import SWITCHES
+from runtime.controls import KEYS
 from runtime.puppet import Puppet
 from runtime.render.context import headless_context, release_headless
 from runtime.skin import Elasticity
@@ -82,6 +83,22 @@ def test_every_action_is_tried_here() -> None:
         assert action.text
         assert action.press or action.write
         assert action.read or not action.write, "what can be set can be shown"
+
+
+def test_the_documented_table_is_the_table() -> None:
+    page = (Path(__file__).resolve().parents[2] / "docs" / "remote.md").read_text("utf-8")
+    rows = [
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in page.splitlines()
+        if line.startswith("| `/bunraku/")
+    ]
+    keys = {name: f"`{key}`" for key, name in KEYS.items()}
+    table = []
+    for name, action in ACTIONS.items():
+        takes = "fader" if action.press is None else "switch" if action.write else "press"
+        tells = "yes" if action.read else ""
+        table.append([f"`/bunraku/{name}`", keys.get(name, ""), action.text, takes, tells])
+    assert rows == table
 
 
 def test_a_match_is_accepted_and_looked_for_again(show: Show) -> None:
