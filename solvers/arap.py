@@ -346,4 +346,4 @@ def warm() -> None:
     solver = ArapSolver(grid, faces, [0, 8, 72, 80], energy=SMOOTH_ROTATIONS)
     solver.stiffen(np.zeros(81, dtype=np.int64), np.ones(81))
     solver.stiffness = 0.5
-    solver.solve(grid[[0, 8, 72, 80]], 1)
+    solver.solve(grid[[0, 8, 72, 80]][::-1], 1)
