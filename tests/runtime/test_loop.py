@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from typing import Self
 
@@ -102,6 +103,7 @@ def loop_of(  # what every show needs, with what a test cares for
     recorder: Tape | None = None,
     conditioning: Conditioning | None = None,
     shown: bool = False,
+    clock: Callable[[], float] = time.monotonic,
 ) -> FrameLoop:
     for puppet in puppets:
         puppet.rest()
@@ -118,6 +120,7 @@ def loop_of(  # what every show needs, with what a test cares for
         outputs=outputs,
         conditioning=conditioning,
         shown=shown,
+        clock=clock,
     )
 
 
@@ -275,6 +278,58 @@ def test_who_looks_sees_every_tick(puppet: Puppet, context: moderngl.Context) ->
     assert not loop.tick()
     assert np.abs(theatre.picture().astype(int) - before).max() > 40
     theatre.close()
+
+
+class Shown(Kept):
+    """A screen somewhere else."""
+
+    def __init__(self, pictures_a_second: float) -> None:
+        super().__init__(pictures_a_second)
+        self.pictures: list[np.ndarray] = []
+
+    def show(self, picture: np.ndarray) -> None:
+        self.pictures.append(picture)
+
+
+def test_a_screen_goes_on_while_nobody_is_seen_and_files_do_not(
+    puppet: Puppet, context: moderngl.Context
+) -> None:
+    """Also without a performer the light goes out where the audience is."""
+    now = [0.0]
+    theatre = Theatre(context, SIZE, [puppet], BODY, clock=lambda: now[0])
+    screen, file = Shown(20.0), Kept(20.0)
+    wire = Wire([captured(pose(), 0.0)])
+    loop = loop_of(wire, [puppet], [[screen, file]], theatre=theatre, clock=lambda: now[0])
+    assert loop.tick()
+    theatre.blackout.to(1.0)
+    for _ in range(120):  # two seconds
+        now[0] += 1.0 / 60.0
+        assert not loop.tick()
+    theatre.close()
+    assert 38 <= len(screen.pictures) <= 2.0 * 20.0 / 0.75 + 1
+    assert screen.pictures[0].max() > 0
+    assert not screen.pictures[-1][..., :3].any()
+    assert len(screen.frames) == len(file.frames) == 1, "no frame, and so none in a file"
+
+
+def test_a_frozen_loop_publishes_every_frame_with_the_characters_as_they_were(
+    puppet: Puppet,
+) -> None:
+    player, kept, tape = Player(record(waving(9)), EveryFrame()), Kept(), Tape()
+    loop = loop_of(player, [puppet], [[kept]], recorder=tape)
+    for _ in range(3):
+        loop.tick()
+    loop.frozen = True
+    for _ in range(3):
+        loop.tick()
+    loop.frozen = False
+    play(loop, player)
+    shapes = [frame.vertices for frame in kept.frames]
+    assert len(tape.frames) == len(shapes) == 9
+    for shape in shapes[3:6]:
+        np.testing.assert_array_equal(shape, shapes[2])
+    assert np.abs(shapes[6] - shapes[5]).max() > 1e-3
+    assert [frame.index for frame in kept.frames] == list(range(9))
 
 
 def test_each_performer_drives_a_character_of_their_own(puppet: Puppet) -> None:
