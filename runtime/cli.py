@@ -402,11 +402,18 @@ def parser() -> argparse.ArgumentParser:
     )
     bridge.add_argument("--seconds", type=positive, help="stop after this long")
 
-    add(
+    there = add(
         "devices",
-        _command("info", "devices_there"),
-        "the kinds of devices and built-in characters there are",
+        _command("devices", "devices"),
+        "what is connected, what arrives, which ports are taken",
     )
+    there.add_argument(
+        "addresses", nargs="*", metavar="URL", help="listen there (default: where each kind is)"
+    )
+    there.add_argument(
+        "--seconds", type=positive, default=2.0, metavar="N", help="how long (default 2)"
+    )
+    there.add_argument("--json", type=Path, metavar="FILE", help="write it there as well")
     info = add("info", _command("info", "info"), "what is in a recording or a character's file")
     info.add_argument("file", metavar="FILE")
     convert = add(

@@ -6,18 +6,23 @@ import argparse
 import importlib
 import os
 import platform
+import socket
 import sys
 from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 
+from devices.address import LOOPBACK
 from devices.errors import InputError
+from devices.port_owner import port_owner
+from devices.udp import QUEUE
 from replay.builtin import builtin_recording
 from replay.player import EveryFrame, Player
 from runtime.characters.builtin import BUILTIN, builtin_character
 from runtime.characters.cache import cache_folder
 from runtime.characters.proxy import proxy_of
+from runtime.commands.devices import listening_ports
 from runtime.director import Choices, Director
 from runtime.loop import FrameLoop
 from runtime.output.report import Report
@@ -25,17 +30,23 @@ from runtime.output.video import encoder_for
 from runtime.performer import Performer
 from runtime.puppet import Puppet
 from runtime.render.context import headless_context, is_software, release_headless, renderer_name
+from runtime.render.egl import egl_devices
 from runtime.skin import Elasticity
 from runtime.theatre import Theatre
 
-EXTRAS = {
+EXTRAS: dict[str, tuple[str, ...]] = {
     "characters": ("pygel3d", "fast_simplification", "manifold3d"),
     "video": ("av",),
     "usd": ("pxr",),
+    "leap": ("websockets",),
+    "mediapipe": ("mediapipe", "cv2"),
     "camera": ("pyvirtualcam",),
     "ndi": ("cyndilib",),
     "bench": ("igl",),
 }
+if sys.platform in ("win32", "darwin"):
+    EXTRAS["spout"] = ("SpoutGL",) if sys.platform == "win32" else ("syphon",)
+LONGEST_QUEUE = Path("/proc/sys/net/core/rmem_max")  # [bytes] that Linux gives a socket at most
 WARM_FRAMES = 3
 
 Check = Callable[[], str]
@@ -50,6 +61,8 @@ def doctor(options: argparse.Namespace) -> int:
         except (InputError, OSError) as error:
             wrong += 1
             print(f"WRONG    {name:<12} {error}")
+    for name, note in NOTES.items():
+        print(note(name))
     for extra, modules in EXTRAS.items():
         print(_extra(extra, modules))
     if options.warm:
@@ -64,11 +77,22 @@ def _python() -> str:
     return f"{platform.python_version()} on {platform.system()} {platform.machine()}"
 
 
+def _egl() -> str:
+    if not sys.platform.startswith("linux"):
+        return "not needed here"
+    devices = egl_devices()
+    if not devices:
+        raise InputError("EGL has no device; install a graphics driver or libgl1-mesa-dri")
+    told = [f"{one.vendor} {one.version}" if one.vendor else "closed to us" for one in devices]
+    return f"{len(devices)} device{'s' * (len(devices) != 1)}: {', '.join(told)}"
+
+
 def _headless() -> str:
     context = headless_context()
     try:
         kind = "software" if is_software(context) else "hardware"
-        return f"{renderer_name(context)} ({kind})"
+        vendor = context.info.get("GL_VENDOR", "unknown vendor")
+        return f"{vendor}, {renderer_name(context)} ({kind})"
     finally:
         release_headless(context)
 
@@ -94,11 +118,50 @@ def _video() -> str:
 
 CHECKS: dict[str, Check] = {
     "python": _python,
+    "EGL": _egl,
     "headless GL": _headless,
     "display": _display,
     "cache": _cache,
     "video": _video,
 }
+
+
+def _ports(name: str) -> str:
+    """Which of the devices' ports others have; so does another show, which is no fault."""
+    taken = [port for port in listening_ports() if not _is_free(port)]
+    if not taken:
+        return f"ok       {name:<12} {', '.join(map(str, listening_ports()))} are free"
+    told = []
+    for port in taken:
+        owner = port_owner(port)
+        told.append(f"{port} by {f'{owner.name} (process {owner.process})' if owner else 'others'}")
+    return f"taken    {name:<12} {', '.join(told)}: close it, or give the device another port"
+
+
+def _is_free(port: int) -> bool:
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as trial:
+        try:
+            trial.bind((LOOPBACK, port))
+        except OSError:
+            return False
+        return True
+
+
+def udp_queue(name: str, limit: Path = LONGEST_QUEUE) -> str:
+    """How many bytes of datagrams wait at most while the program is busy."""
+    try:
+        longest = int(limit.read_text(encoding="ascii"))
+    except (OSError, ValueError):
+        return f"ok       {name:<12} as the system sets it"
+    if longest < QUEUE:
+        cure = f"sudo sysctl -w net.core.rmem_max={QUEUE}"
+        return f"small    {name:<12} {longest} bytes; bursts may lose packets: {cure}"
+    return f"ok       {name:<12} {longest} bytes"
+
+
+Note = Callable[[str], str]
+NOTES: dict[str, Note] = {"UDP ports": _ports, "UDP queue": udp_queue}
+"""What is told and is no fault of the machine's."""
 
 
 def _extra(extra: str, modules: tuple[str, ...]) -> str:

@@ -1,15 +1,13 @@
-"""`bunraku info` and `bunraku devices`: what is in a file, and what there is to open."""
+"""`bunraku info`: what is in a recording or a character's file."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-from devices.stream import ADAPTERS
-from replay.formats import formats, recognise
+from replay.formats import recognise
 from replay.info import summary
 from runtime.cast import character_named, is_character
-from runtime.characters.builtin import BUILTIN
 
 
 def info(options: argparse.Namespace) -> int:
@@ -38,12 +36,3 @@ def _of_character(name: str) -> list[str]:
         f"on stage    {width:.2f} x {height:.2f} x {depth:.2f} m",
         *(f"note        {note}" for note in character.notes),
     ]
-
-
-def devices_there(options: argparse.Namespace) -> int:
-    """Print the kinds of devices, recordings and built-in characters."""
-    del options
-    print("devices:    " + ", ".join(f"{scheme}://" for scheme in ADAPTERS))
-    print("recordings: " + ", ".join(kind.name for kind in formats()))
-    print("characters: " + ", ".join(BUILTIN))
-    return 0
