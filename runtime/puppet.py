@@ -30,6 +30,7 @@ Indices = NDArray[np.int64]
 STRAIGHT_ON = np.eye(3)  # how a capture device sees its performer
 MOST_STRETCH = 0.4  # of an edge at the 99th percentile, in a rehearsal
 REHEARSED_ITERATIONS = 4  # poses of a rehearsal lie far apart
+EASY = 0.75  # of that: a pose that stretches less is not tried again
 ROUNDS = 16  # of a rehearsal, at most
 LEAST_STEP = 0.9  # by which a limb is held back in a round
 
@@ -185,16 +186,19 @@ class Puppet:
             (2, 3) [m] least and greatest corner of all that it fills meanwhile, on the stage.
         """
         pulls = self._drives_of_edges()
+        boxes, stretches = zip(*(self._try(pose) for pose in poses), strict=True)
+        corners, stretch = np.array(boxes), np.array(stretches)
         for _ in range(ROUNDS):
-            boxes, stretches = zip(*(self._try(pose) for pose in poses), strict=True)
-            stretch = np.array(stretches)
             if np.percentile(stretch, 99.0) <= MOST_STRETCH:
                 break
             self._hold_back(stretch, pulls)
+            # Smaller turns stretch no pose more: those that were well within stay so.
+            tight = np.percentile(stretch, 99.0, axis=1) > EASY * MOST_STRETCH
+            for number in np.flatnonzero(tight).tolist():
+                corners[number], stretch[number] = self._try(poses[number])
         self.skin.reset()
         for _, retarget in self._retargets:
             retarget.reset()
-        corners = np.array(boxes)
         return np.array([corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)])
 
     def _try(self, pose: Pose) -> tuple[Array, Array]:

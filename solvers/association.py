@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import linear_sum_assignment
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -29,6 +28,9 @@ def associate(distance: Array, same_name: Bools, within: Bools) -> NDArray[np.in
     Returns:
         (D,) index of the known one, or -1 for somebody new.
     """
+    # Loading SciPy's optimisation takes longer than most of a show's start, and few need it.
+    from scipy.optimize import linear_sum_assignment  # noqa: PLC0415
+
     detections, known = distance.shape
     cost = np.full((detections, known + detections), 1e6)
     named = np.minimum(distance, FURTHEST) - LOYALTY
