@@ -238,6 +238,17 @@ def test_frozen_characters_hold_while_frames_and_takes_go_on(show: Show, tmp_pat
     assert len(read_recording(tmp_path / "out-1.mcap")) == 5
 
 
+def test_a_match_asked_for_while_frozen_is_shown_afterwards(show: Show) -> None:
+    show.loop.tick()
+    shown = show.puppet.mapping.drives
+    press(show, "freeze", "next-match")
+    show.loop.tick()
+    assert show.puppet.mapping.drives == shown
+    press(show, "freeze")
+    show.loop.tick()
+    assert show.puppet.mapping.drives != shown
+
+
 def test_a_blackout_fades_pictures_to_black_and_back(show: Show) -> None:
     perform(show)
     press(show, "freeze", "blackout")  # frozen, so that only the light changes

@@ -167,13 +167,14 @@ def test_a_switch_can_be_set_whatever_it_was(show: Staged) -> None:
 
 
 def test_what_is_asked_for_is_done_in_order(show: Staged) -> None:
-    wishes = [("mirror/set", 1.0), ("mirror", 1.0), ("mirror", 1.0), ("mirror/set", 0.0)]
+    """Also where it all comes at once, and one wish takes the place of another."""
+    wishes = [("mirror/set", 1.0), ("mirror", 1.0), ("mirror/set", 1.0), ("freeze", 1.0)]
     messages = [write_message(f"/bunraku/{name}", "f", value) for name, value in wishes]
-    (bundle,) = write_bundles([*messages, write_message("/bunraku/mirror")], 1400)
+    (bundle,) = write_bundles(messages, 1400)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         sender.sendto(bundle, (LOOPBACK, show.remote.port))
-        show.until(lambda: show.switches.mirror)
-    assert not show.remote._wishes
+        show.until(lambda: show.loop.frozen)
+    assert show.switches.mirror
 
 
 def test_a_show_is_run_from_a_phone_from_match_to_blackout(show: Staged) -> None:
