@@ -330,6 +330,26 @@ def test_joints_that_are_not_told_are_not_seen() -> None:
     assert np.isnan(partial[0].positions[partial[0].confidence == 0.0]).all()
 
 
+@pytest.mark.parametrize("lost", [1, 10, 300])
+def test_a_hand_that_is_lost_for_a_while_holds_nothing_up(lost: int) -> None:
+    said = [osceleton(body(k % 50) + FAR) for k in range(lost + 40)]
+    for k in range(20, 20 + lost):
+        said[k] = [one for one in said[k] if one.params[0] != "l_hand"]
+    decoder = NimateDecoder()
+    frames = fed(decoder, said)
+    gone = [bool(frame.confidence[joint("LeftHand")] == 0.0) for frame in frames]
+    assert len(frames) == len(said)
+    assert sum(gone) == lost
+    assert not gone[-1]
+    assert decoder.refused == 0
+
+
+def test_a_future_timetag_waits_for_nobody() -> None:
+    decoder = NimateDecoder()
+    late = [bundle(osceleton(body(k) + FAR), timetag=2e9) for k in range(3)]
+    assert sum(len(decoder.feed(data, 1.0 + k * STEP)) for k, data in enumerate(late)) == 3
+
+
 def test_a_datagram_that_comes_twice_is_one() -> None:
     decoder = NimateDecoder()
     frames: list[SkeletonFrame] = []
