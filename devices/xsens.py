@@ -3,9 +3,9 @@
 Datagrams are big-endian. Of their kinds, MXTP02 (positions and quaternions) and MXTP01 (positions
 and Euler angles) hold a pose; a pose that is too long for one datagram comes in several. MVN's
 world is right-handed, Z up (``?up=y`` where MVN was told so), the suit's X forward at calibration;
-in MXTP01 it is Y up, Z forward. Positions are metres or, in older versions, centimetres: of a body
-whose head is 5 of them away from its pelvis, centimetres. In which order MXTP01's angles are to be
-applied is not specified, so its rotations are left unknown.
+in MXTP01 it is Y up, Z forward. Positions are metres or centimetres, as versions differ; the size
+of the body tells. In which order MXTP01's angles are to be applied is not specified, so its
+rotations are left unknown.
 
 Source: MVN real-time network streaming protocol specification, section 2.
 """
@@ -35,7 +35,7 @@ MOST_CHARACTERS = 32
 MOST_OPEN = 4  # samples of one character whose datagrams are waited for
 MOST_PARTS = 8  # datagrams of one sample
 LATE = 1000  # samples that a datagram is behind at most; one further behind began to count anew
-SHORTEST_IN_CM = 5.0  # between pelvis and head
+SMALLEST_IN_CM = 5.0  # of a body whose size in metres is 0.5 or less
 
 HEADER = struct.Struct(">6sIBBIBBBBHH")
 _LAST = 0x80  # flag of the datagram counter
@@ -51,7 +51,7 @@ _AXES = {
     "z": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
     "y": np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]),
 }
-_PELVIS, _HEAD = 0, 6
+_FEWEST = 3  # segments by which a body can be measured
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -201,9 +201,9 @@ class XsensDecoder:
         joints, inside = _joint_numbers(segments["id"], props, count)
         positions, rotations = np.full((count, 3), np.nan), np.full((count, 4), np.nan)
         positions[joints] = segments["position"][inside]
-        torso = float(np.linalg.norm(positions[_HEAD] - positions[_PELVIS]))
-        if np.isfinite(torso):
-            character.unit = 0.01 if torso > SHORTEST_IN_CM else 1.0
+        size = _size(positions[:BODY])
+        if size > 0.0:
+            character.unit = 0.01 if size > SMALLEST_IN_CM else 1.0
         positions *= character.unit
         positions[~(np.abs(positions) < FARTHEST).all(axis=1)] = np.nan  # NaN is not less
         if "rotation" not in (segments.dtype.names or ()):
@@ -230,6 +230,14 @@ def _datagram(data: bytes) -> _Datagram | None:
         return None
     segments = np.frombuffer(data, layout, offset=HEADER.size)
     return _Datagram(tag, counter, number, last, time * 1e-3, who, props, segments)
+
+
+def _size(positions: Array) -> float:
+    """How far a body's segments are from its middle, in the median; 0 where too few are seen."""
+    seen = positions[np.isfinite(positions).all(axis=1)]
+    if len(seen) < _FEWEST:
+        return 0.0
+    return float(np.median(np.linalg.norm(seen - np.median(seen, axis=0), axis=1)))
 
 
 def _joint_numbers(

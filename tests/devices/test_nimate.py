@@ -362,6 +362,18 @@ def test_a_datagram_that_comes_twice_is_one() -> None:
     assert decoder.refused == 10 * 15
 
 
+def test_a_joint_that_comes_again_after_others_ends_no_frame() -> None:
+    decoder = NimateDecoder()
+    frames: list[SkeletonFrame] = []
+    for k in range(10):
+        said = osceleton(body(k) + FAR)
+        for n, one in enumerate([*said[:5], said[2], *said[5:9], said[0], *said[9:]]):
+            frames += decoder.feed(one.dgram, 10.0 + k * STEP + n * 1e-5)
+    assert len(frames) >= 9
+    assert all((frame.confidence == 1.0).all() for frame in frames)
+    assert decoder.refused == 20
+
+
 EVIL = [
     "@__import__('os').abort()",
     "?raise SystemExit",

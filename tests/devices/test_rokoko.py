@@ -196,6 +196,8 @@ HOSTILE = {
     "half of it": plain(scene())[:-20],
     "half of it, packed": packed(scene())[:-20],
     "packed twice over": packed(scene()) * 2,
+    "too much, plain": plain(scene()) + b" " * MOST_BYTES,
+    "too much, packed": lz4.frame.compress(plain(scene()) + b" " * MOST_BYTES),
     "a bomb": lz4.frame.compress(b" " * (MOST_BYTES + 1)),
     "a bomb's beginning": lz4.frame.compress(b"0" * (40 << 20))[:65507],
     "a magic number alone": b"\x04\x22\x4d\x18",

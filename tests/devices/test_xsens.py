@@ -74,10 +74,13 @@ def test_y_may_be_up() -> None:
     assert (Rotation.from_quat(frame.rotations) * TURNS.inv()).magnitude().max() < 1e-5
 
 
-def test_old_versions_send_centimetres() -> None:
-    places = posed(XSENS)
-    (frame,) = XsensDecoder().feed(mxtp02(100.0 * places)[0], 1.0)
-    assert frame.positions == pytest.approx(places, abs=1e-4)
+@pytest.mark.parametrize("part", [slice(0, 23), slice(15, 23), slice(4, 15)])
+def test_some_versions_send_centimetres(part: slice) -> None:
+    places, ids = posed(XSENS)[part], range(1, 24)[part]
+    for unit in (1.0, 100.0):
+        (frame,) = XsensDecoder().feed(mxtp02(unit * (places + 4.0), ids=ids)[0], 1.0)
+        assert frame.positions[part] == pytest.approx(places + 4.0, abs=1e-3)
+        assert np.count_nonzero(frame.confidence) == len(places)
 
 
 def test_euler_angles_bring_positions_only() -> None:
