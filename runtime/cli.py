@@ -119,7 +119,9 @@ def remote_address(text: str) -> tuple[str, int | None]:
 
 def port_number(text: str) -> int:
     """A port from 1 to 65535."""
-    return host_port(f"host:{text}")[1] or 0
+    if not (text.isascii() and text.isdecimal() and 1 <= int(text[:6]) <= 65535):
+        raise argparse.ArgumentTypeError(f"expected a port from 1 to 65535, got {text!r}")
+    return int(text)
 
 
 class _Parser(argparse.ArgumentParser):

@@ -254,6 +254,8 @@ class _Show:
     def _open_remote(self) -> Remote | None:
         """The remote control, if one was asked for."""
         if self._options.remote is None:
+            if self._options.remote_feedback is not None:
+                raise InputError("--remote-feedback answers a remote control: add --remote")
             return None
         host, port = self._options.remote
         answers = self._options.remote_feedback or 0

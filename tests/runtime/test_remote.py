@@ -340,6 +340,25 @@ def test_a_port_that_is_taken_is_one_line(capsys: pytest.CaptureFixture[str]) ->
     assert f"UDP port {port} is taken" in line
 
 
+@pytest.mark.parametrize(
+    ("options", "reason"),
+    [
+        (["--remote", "127.0.0.1:99999"], "expected HOST:PORT"),
+        (["--remote", "9100:"], "expected HOST:PORT"),
+        (["--remote", "203.0.113.9:9100"], "no address of this machine"),
+        (["--remote", "127.0.0.1:9100", "--remote-feedback", "0"], "a port from 1 to 65535"),
+        (["--remote-feedback", "9000"], "add --remote"),
+    ],
+)
+def test_what_cannot_be_listened_on_is_one_line(
+    options: list[str], reason: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["demo", "--character", "squid", "--headless", "--fast", *options]) == 2
+    line = capsys.readouterr().err
+    assert reason in line
+    assert line.count("\n") == 1
+
+
 def test_it_ends_with_its_thread_and_gives_the_port_back(show: Staged) -> None:
     show.remote.close()
     show.remote.close()
