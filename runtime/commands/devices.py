@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from enum import StrEnum
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 from urllib.parse import SplitResult, urlsplit
@@ -171,6 +172,8 @@ def _closed(seen: Watch, reason: str) -> Watch:
     port = port_of(seen.address)
     if address.scheme in LISTENS and port and f"{port} is taken" in reason:
         seen.state, seen.owner = State.TAKEN, port_owner(port)
+    elif address.netloc == "webcam" and find_spec("mediapipe") is None:
+        seen.detail = "a webcam needs the extra: pip install 'bunraku[mediapipe]'"
     elif address.scheme == "zmq+tcp" and "no bridge answers" in reason:
         seen.state = State.SILENT
     return seen

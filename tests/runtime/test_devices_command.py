@@ -13,6 +13,7 @@ import threading
 import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -107,13 +108,14 @@ def test_each_place_has_a_state_of_its_own() -> None:
         third.close()
         actors = rokoko_v3({"Ann": bones(posed_rokoko()), "Bob": bones(posed_rokoko())})
         with sending(ports[0], packed(actors)), sending(ports[1], b"noise"):
-            taken, arriving, unclear, sim, leap = watch(
+            taken, arriving, unclear, sim, leap, webcam = watch(
                 [
                     f"xsens://127.0.0.1:{holder.getsockname()[1]}",
                     f"rokoko://127.0.0.1:{ports[0]}",
                     f"xsens://127.0.0.1:{ports[1]}",
                     "sim://walk",
                     "leap://",
+                    "mediapipe://webcam",
                 ],
                 1.5,
             )
@@ -128,6 +130,9 @@ def test_each_place_has_a_state_of_its_own() -> None:
     assert sim.state is State.READY
     assert leap.state in (State.MISSING, State.SILENT)
     assert leap.detail
+    assert webcam.state is State.MISSING
+    wanted = "model=FILE" if find_spec("mediapipe") else "pip install 'bunraku[mediapipe]'"
+    assert wanted in webcam.detail
 
 
 def posed_rokoko() -> Any:
