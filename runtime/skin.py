@@ -154,7 +154,9 @@ class Skin:
         strain = thin[:, None, None] * np.eye(3) + (anchors.lengths - thin)[:, None, None] * along
         moved = anchors.whole @ turn @ strain
         targets = group_targets(self._offsets, self._group, moved, anchors.pivots)
-        return self._solver.solve(targets, iterations, out=self._answer)
+        self._solver.solve(targets, iterations, out=self._answer)
+        self._solver.iron(self._answer)
+        return self._answer
 
     def cover(self, deformed: Array) -> Array:
         """Give the character's own vertices (N, 3) [m] that go with the deformed surface (C, 3).

@@ -17,6 +17,7 @@ model for elastic deformations, for the energy with rims. Four things are added.
 from __future__ import annotations
 
 import math
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -25,6 +26,7 @@ from solvers.arap_cells import SPOKES, SPOKES_AND_RIMS, build_cells
 from solvers.arap_kernels import energy_terms, fit_cells, place_outside, pull_soft, residual
 from solvers.arap_layout import Frame, checked_integers, checked_mesh, checked_targets, lay_out
 from solvers.compiled import most_threads, threads_for
+from solvers.creases import Creases
 from solvers.following import Following
 from solvers.handle_motion import farthest_motion, fit_motions, follow, follow_one_group
 from solvers.handles import checked_handles, nearest_groups, unheld
@@ -226,6 +228,26 @@ class ArapSolver:
         energy = self._energy_of(self._x)
         self._R[:] = rotations
         return energy * self._frame.size**2
+
+    def iron(self, answer: Floats) -> int:
+        """Lay flat what is folded in the answer (N, 3) of the last solve, in place.
+
+        What goes on to the next frame is left as it is: see `solvers.creases`.
+
+        Returns:
+            How many triangles were folded.
+        """
+        order = self._layout.order
+        np.take(answer, order, axis=0, out=self._from_rest)
+        with threads_for(len(order)):
+            folded = self._creases.iron(self._from_rest, self._R)
+        if folded:
+            answer[order] = self._from_rest
+        return folded
+
+    @cached_property
+    def _creases(self) -> Creases:
+        return Creases(self._rest, self._layout.faces, self._mesh.cells)
 
     def rotations(self) -> Floats:
         """How each vertex's cell was turned by the last iteration, (N, 3, 3)."""

@@ -187,11 +187,17 @@ def bind(
     owner = _owners(vertices, nearest, parents, anchors, points)
     handles: list[int] = []
     groups: list[int] = []
+    beside = np.zeros(len(vertices), dtype=np.bool_)  # those that share a triangle with a handle
     for index, anchor in enumerate(anchors):
-        candidates = np.flatnonzero(owner == index)
-        if len(candidates) == 0:
+        own = np.flatnonzero(owner == index)
+        if len(own) == 0:
             continue
+        # Two rings that touch would fold what is between them as soon as they turn differently.
+        candidates = own[~beside[own]]
+        if len(candidates) < RING:
+            candidates = own
         ring = candidates[_ring(vertices[candidates] - anchor.point, anchor.tangent)]
+        beside[faces[np.isin(faces, ring).any(axis=1)]] = True
         handles.extend(ring.tolist())
         groups.extend([index] * len(ring))
     _hold_loose_components(vertices, faces, owner, handles, groups)

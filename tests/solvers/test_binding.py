@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial.transform import Rotation
 
+from runtime.cast import character_named
 from solvers.arap import ArapSolver
 from solvers.binding import RING, SPACING, Binding, bind
 from solvers.limbs import closest_bones, limbs
@@ -281,3 +283,14 @@ def test_the_choice_is_the_same_every_time() -> None:
     first, second = (bind(mesh.vertices, mesh.faces, CROSS_PARENTS, CROSS_NODES) for _ in "ab")
     for name in Binding.__slots__:
         np.testing.assert_array_equal(getattr(first, name), getattr(second, name))
+
+
+def test_rings_that_have_room_do_not_touch(shared: Path) -> None:
+    character = character_named(str(shared / "mesh" / "elephant.obj"))
+    skeleton = character.skeleton
+    binding = bind(character.vertices, character.faces, skeleton.parents, skeleton.rest_positions)
+    anchor_at = np.full(len(character.vertices), -1)
+    anchor_at[binding.handles] = binding.anchor
+    held = anchor_at[character.faces]
+    several = [{int(a) for a in corners if a >= 0} for corners in held]
+    assert sum(len(anchors) > 1 for anchors in several) < 0.01 * len(binding.handles)
