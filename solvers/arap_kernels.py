@@ -133,10 +133,10 @@ def energy_terms(x: Floats, R: Floats, rest: Floats, terms: Terms, out: Floats) 
         out[t] = terms.weights[t] * (d0 * d0 + d1 * d1 + d2 * d2)
 
 
-@parallel_kernel
+@kernel
 def place_outside(x: Floats, order: Ints, centre: Floats, size: float, out: Floats) -> None:
     """Vertex order[i] of out (N, 3) is x[i] times the size, plus the centre (3,)."""
-    for i in prange(len(order)):
+    for i in range(len(order)):
         v = order[i]
         out[v, 0] = x[i, 0] * size + centre[0]
         out[v, 1] = x[i, 1] * size + centre[1]

@@ -19,7 +19,7 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 import numba
 
 # Below this many vertices, waking a second thread takes longer than what it would do.
-_WORTH_SHARING = 4000
+_WORTH_SHARING = 7000
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
@@ -86,7 +86,8 @@ def one_blas_thread() -> AbstractContextManager[object]:
 
     A BLAS whose threads spin while they wait takes the cores that the kernels' threads need.
     """
-    return _blas().limit(limits=1, user_api="blas")
+    limited: AbstractContextManager[object] = _blas().limit(limits=1, user_api="blas")
+    return limited
 
 
 @cache

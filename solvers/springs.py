@@ -35,12 +35,13 @@ class Springs:
 
     def step(self, target: ArrayLike, seconds: float) -> Array:
         """Where they are (n,) after `seconds` [s] of being pulled to `target` (n,)."""
+        goal = np.asarray(target, dtype=np.float64)
         decay = self._damping * self._omega
         turn = self._omega * math.sqrt(1.0 - self._damping**2)
         fade = math.exp(-decay * seconds)
         cosine, sine = fade * math.cos(turn * seconds), fade * math.sin(turn * seconds) / turn
-        away = self.at - target
+        away = self.at - goal
         push = self.speed + decay * away
         self.speed = cosine * self.speed - sine * (self._omega**2 * away + decay * self.speed)
-        self.at = np.asarray(target + cosine * away + sine * push)
+        self.at = np.asarray(goal + cosine * away + sine * push)
         return self.at

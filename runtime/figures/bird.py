@@ -27,7 +27,7 @@ def bird() -> Character:
     surface = Surface(
         vertex=np.arange(count),
         faces=faces.astype(np.int32),
-        colors=np.tile(np.float32(_COLOUR), (count, 1)),
+        colors=np.tile(np.array(_COLOUR, dtype=np.float32), (count, 1)),
         uvs=None,
         materials=(Material(np.ones(4, dtype=np.float32)),),
         face_material=np.zeros(len(faces), dtype=np.int64),
