@@ -65,7 +65,7 @@ class BridgeStream:
         InputError: no bridge answers in time, it refuses our key, or it speaks another version.
     """
 
-    def __init__(self, bridge: Bridge, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, bridge: Bridge, clock: Callable[[], float] = time.perf_counter) -> None:
         self._bridge = bridge
         self._clock = clock
         self._receiver = BridgeReceiver(bridge.mode)

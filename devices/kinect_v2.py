@@ -148,7 +148,7 @@ class KinectV2:
     def __init__(self, library: ctypes.CDLL) -> None:
         self._sensor, self._reader = ctypes.c_void_p(), ctypes.c_void_p()
         self._bodies = (ctypes.c_void_p * PEOPLE)()
-        self._last = time.monotonic()
+        self._last = time.perf_counter()
         library.GetDefaultKinectSensor.restype = ctypes.c_uint32
         code = library.GetDefaultKinectSensor(ctypes.byref(self._sensor))
         if not code:
@@ -178,15 +178,15 @@ class KinectV2:
         """The bytes of the newest `Packet`, or None when none came in time."""
         frame = ctypes.c_void_p()
         latest = _method(self._reader, _READER_ACQUIRE_LATEST_FRAME, ctypes.c_void_p)
-        until = time.monotonic() + WAIT
+        until = time.perf_counter() + WAIT
         while (code := latest(ctypes.addressof(frame))) == PENDING:
-            if time.monotonic() > until:
+            if time.perf_counter() > until:
                 self._still_there()
                 return None
             time.sleep(PAUSE)
         if code:
             raise SensorLostError(f"the Kinect answers no more (0x{code:08X}); is it plugged in?")
-        self._last = time.monotonic()
+        self._last = time.perf_counter()
         try:
             return bytes(self._packet(frame))
         finally:
@@ -196,8 +196,8 @@ class KinectV2:
         available = ctypes.c_ubyte()
         _method(self._sensor, _SENSOR_IS_AVAILABLE, ctypes.c_void_p)(ctypes.addressof(available))
         if available.value:
-            self._last = time.monotonic()
-        elif time.monotonic() - self._last > ASLEEP:
+            self._last = time.perf_counter()
+        elif time.perf_counter() - self._last > ASLEEP:
             raise SensorLostError("the Kinect is not there; plug it in to USB 3, and power it")
 
     def _packet(self, frame: ctypes.c_void_p) -> Packet:

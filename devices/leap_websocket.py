@@ -89,7 +89,7 @@ class LeapWebSocket:
                     if not verified:
                         self._ask(connection)
                         verified = True
-                    deliver(data, time.monotonic(), "")
+                    deliver(data, time.perf_counter(), "")
         except ConnectionClosed as error:
             code = error.rcvd.code if error.rcvd else None
             if code == GOING_AWAY and not verified:

@@ -86,7 +86,7 @@ class LiveStream:
     @property
     def traffic(self) -> Traffic:
         """What has come so far."""
-        rate, jitter = self._rhythm.measure(time.monotonic())
+        rate, jitter = self._rhythm.measure(time.perf_counter())
         return Traffic(
             packets=self._packets,
             frames=self._frames,

@@ -60,7 +60,7 @@ class Webcam:
             image_format=self._mediapipe.ImageFormat.SRGB,
             data=self._cv2.cvtColor(picture, self._cv2.COLOR_BGR2RGB),
         )
-        milliseconds = time.monotonic_ns() // 1_000_000
+        milliseconds = time.perf_counter_ns() // 1_000_000
         found = self._landmarker.detect_for_video(image, milliseconds)
         height, width = picture.shape[:2]
         return landmark_message(found, milliseconds, (width, height))

@@ -83,7 +83,7 @@ class SensorTransport:
             return
         if data is not None:
             self.trouble = ""
-            deliver(data, time.monotonic(), "")
+            deliver(data, time.perf_counter(), "")
 
     def _reopen(self) -> None:
         if self._closing.wait(RETRY):

@@ -35,7 +35,7 @@ class Simulator:
     def __init__(
         self,
         performance: Performance,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = time.perf_counter,
         *,
         performers: int = 1,
     ) -> None:

@@ -65,7 +65,7 @@ class UdpTransport:
         """Deliver every datagram with its arrival and sender's address until it is closed."""
         worked, since = 0.0, time.thread_time()
         while not self._closing.is_set():
-            asked = time.monotonic()
+            asked = time.perf_counter()
             worked, since = worked + time.thread_time() - since, time.thread_time()
             try:
                 data, source = self._receive()
@@ -77,7 +77,7 @@ class UdpTransport:
                 if self._closing.is_set():
                     return
                 raise
-            arrival = time.monotonic()
+            arrival = time.perf_counter()
             worked = 0.0 if arrival - asked > IDLE else worked
             deliver(data, arrival, source)
             if worked > SLICE:

@@ -57,7 +57,7 @@ class McapWriter:
         skeleton: Skeleton,
         *,
         source: Mapping[str, str] | None = None,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = time.perf_counter,
     ) -> None:
         self.path = path
         self.skeleton = skeleton

@@ -49,7 +49,7 @@ class RealTime:
 
     frames_a_poll = math.inf
 
-    def __init__(self, speed: float = 1.0, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, speed: float = 1.0, clock: Callable[[], float] = time.perf_counter) -> None:
         if not (math.isfinite(speed) and speed > 0):
             raise ValueError(f"Expected a finite `speed` above 0, got {speed}")
         self.speed = speed

@@ -18,7 +18,7 @@ class Fade:
         target: where it is, or is going.
     """
 
-    def __init__(self, seconds: float, clock: Callable[[], float] = time.monotonic) -> None:
+    def __init__(self, seconds: float, clock: Callable[[], float] = time.perf_counter) -> None:
         self.target = 0.0
         self._seconds = seconds
         self._clock = clock

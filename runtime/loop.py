@@ -65,7 +65,7 @@ class FrameLoop:
         others: Sequence[Act] = (),
         conditioning: Conditioning | None = None,
         shown: bool = False,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = time.perf_counter,
     ) -> None:
         self.frozen = False
         self.frames = self.received = 0

@@ -46,7 +46,7 @@ class OnArrival:
         self,
         stream: Waking,
         *,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = time.perf_counter,
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         self._stream = stream

@@ -26,7 +26,7 @@ def provenance(origin: str) -> dict[str, str]:
         "origin": _without_password(origin),
         "program": program,
         "began": datetime.now(UTC).isoformat(timespec="milliseconds"),
-        "host_clock": f"{time.monotonic():.6f}",
+        "host_clock": f"{time.perf_counter():.6f}",
     }
 
 

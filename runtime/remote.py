@@ -110,7 +110,7 @@ class Remote:
         *,
         answer_port: int = 0,
         tell: Callable[[str], None],
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = time.perf_counter,
     ) -> None:
         self.refused = self.dropped = 0
         self._answer_port = answer_port

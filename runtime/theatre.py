@@ -57,7 +57,7 @@ class Theatre:
         *,
         background: Background | None = None,
         plain: bool = False,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = time.perf_counter,
     ) -> None:
         self.blackout = Fade(BLACKOUT, clock)
         self.stage = Stage(context, size, background=background)

@@ -166,13 +166,13 @@ class _Stamping(Theatre):
     def upload(self, motions: Sequence[Motion]) -> None:
         super().upload(motions)
         self.context.finish()
-        self.uploaded = time.monotonic()
+        self.uploaded = time.perf_counter()
 
     def draw(self, pose: Pose | None) -> None:
         if self.draws:
             super().draw(pose)
             self.context.finish()
-            self.drawn = time.monotonic()
+            self.drawn = time.perf_counter()
 
 
 class _Show:
@@ -203,13 +203,13 @@ class _Show:
         """Perform until so many frames have come, or none comes any more."""
         stream, theatre = self._stream, self.theatre
         pace = OnArrival(stream.stream)
-        heard = time.monotonic()
-        while stream.given < count and time.monotonic() - heard < PATIENCE:
+        heard = time.perf_counter()
+        while stream.given < count and time.perf_counter() - heard < PATIENCE:
             pace.wait()
             with held():
                 performed = self._loop.tick()
             if performed and stream.newest is not None:
-                heard = time.monotonic()
+                heard = time.perf_counter()
                 newest = stream.newest
                 stamps = (newest.time, newest.arrival, theatre.uploaded, theatre.drawn)
                 self._rows.append((stream.given, *stamps))

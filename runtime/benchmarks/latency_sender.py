@@ -51,7 +51,7 @@ def _send_all(played: Performance, send: Send, rate: float, count: int) -> None:
         at = round(number * RATE / rate) % len(played.times)
         send(
             SkeletonFrame(
-                time=time.monotonic(),
+                time=time.perf_counter(),
                 positions=played.positions[at],
                 rotations=played.rotations[at],
                 confidence=np.ones(len(played.skeleton.names)),

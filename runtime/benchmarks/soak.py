@@ -105,7 +105,7 @@ def soaked(path: Path, seconds: float, *, real_time: bool) -> Soak:
     ticks = max(int(seconds * RATE), 1)
     clock = _ShowClock()
     stream = Simulator(
-        performance("show"), time.monotonic if real_time else clock, performers=PERFORMERS
+        performance("show"), time.perf_counter if real_time else clock, performers=PERFORMERS
     )
     # Filled, not only claimed, so that their own memory does not grow.
     spent = np.full(ticks, np.nan, np.float32)

@@ -67,9 +67,9 @@ def say(line: str) -> None:
 
 def _carry(stream: SkeletonStream, publisher: BridgePublisher, seconds: float) -> None:
     ticker = Ticker(POLLS)
-    over = time.monotonic() + seconds
+    over = time.perf_counter() + seconds
     carried = RecordedStream(stream, publisher.write)
-    while not stream.ended and time.monotonic() < over:
+    while not stream.ended and time.perf_counter() < over:
         with held():
             carried.poll()
         ticker.wait()

@@ -134,7 +134,7 @@ def watch(addresses: Sequence[str], seconds: float) -> list[Watch]:
 
 def _watch(address: str, seconds: float, stop: threading.Event) -> Watch:
     seen = Watch(address)
-    until = time.monotonic() + seconds
+    until = time.perf_counter() + seconds
     try:
         stream = open_stream(_patient(urlsplit(address), seconds))
     except InputError as error:
@@ -144,12 +144,12 @@ def _watch(address: str, seconds: float, stop: threading.Event) -> Watch:
         if traffic is None:
             seen.state, seen.detail = State.READY, "always there, 60 frames a second"
             return seen
-        while not stop.wait(min(GLANCE, max(until - time.monotonic(), 0.0))):
+        while not stop.wait(min(GLANCE, max(until - time.perf_counter(), 0.0))):
             _look(seen, stream)
-            if time.monotonic() >= until:
+            if time.perf_counter() >= until:
                 break
         seen.traffic = stream.traffic  # type: ignore[attr-defined]
-    return _told(seen, time.monotonic(), seconds)
+    return _told(seen, time.perf_counter(), seconds)
 
 
 def _patient(address: SplitResult, seconds: float) -> str:

@@ -69,10 +69,10 @@ def _first_seconds(
 def _watch(stream: SkeletonStream, recorder: Recorder, warnings: list[str], seconds: float) -> None:
     """Let frames come for so long [s], or until the recorder fails, and say what it has to say."""
     ticker = Ticker(POLLS)
-    began = time.monotonic()
+    began = time.perf_counter()
     over = False
     while not (stream.ended or over or recorder.fault):
-        over = time.monotonic() - began >= seconds
+        over = time.perf_counter() - began >= seconds
         with held():
             stream.poll()
         while warnings and not recorder.fault:

@@ -131,6 +131,8 @@ def _made(character: Character, number: int, options: argparse.Namespace) -> Pup
         volume_gain=asked(options.volume_gain, 1.0),
         stiffness=asked(options.stiffness, 0.0),
     )
+    for note in puppet.skin.notes:
+        warn(f"{character.name}: {note}")
     return puppet
 
 

@@ -34,7 +34,7 @@ class BridgePerformer:
         self,
         performer: Performer,
         publisher: BridgePublisher,
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = time.perf_counter,
     ) -> None:
         self._performer = performer
         self._publisher = publisher

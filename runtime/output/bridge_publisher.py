@@ -96,7 +96,7 @@ class BridgePublisher:
         skeleton: Skeleton,
         *,
         tell: Callable[[str], None],
-        clock: Callable[[], float] = time.monotonic,
+        clock: Callable[[], float] = time.perf_counter,
     ) -> None:
         self.audience = BridgeAudience(skeleton, clock)
         self._tell = tell
@@ -170,12 +170,12 @@ class BridgePublisher:
     def _unfinished(self) -> bool:
         """Whether, while closing, some frame still has a way to go and the time for it."""
         if self._last_word is None:
-            self._last_word = time.monotonic() + LAST_WORDS
-        left = self._last_word - time.monotonic()
+            self._last_word = time.perf_counter() + LAST_WORDS
+        left = self._last_word - time.perf_counter()
         return left > 0.0 and bool(self._handed or not self.audience.settled)
 
     def _hear(self) -> None:
-        began = time.monotonic()
+        began = time.perf_counter()
         for _ in range(AT_ONCE):
             try:
                 route, *parts = self._socket.recv_multipart(zmq.NOBLOCK)
@@ -188,7 +188,7 @@ class BridgePublisher:
                 event = "come" if self.audience.stages > stages else "left"
                 self._tell(f"a stage has {event}: {self.audience.stages} now")
         else:  # more than stages say: the rest of the program gets its share of time
-            self._closing.wait(time.monotonic() - began)
+            self._closing.wait(time.perf_counter() - began)
         if self.audience.other_version is not None:
             self._tell_once(
                 f"a stage speaks version {self.audience.other_version} and we speak {VERSION}; "
@@ -214,7 +214,7 @@ class BridgePublisher:
                 self._tell_once(f"nothing goes to a stage that knocked: {outcome.value}")
 
     def _tell_once(self, line: str) -> None:
-        now = time.monotonic()
+        now = time.perf_counter()
         if now - self._told.get(line, -QUIET) >= QUIET:
             self._told = {**self._told, line: now} if len(self._told) < MOST_TOLD else {line: now}
             self._tell(line)
