@@ -112,6 +112,7 @@ class ArapSolver:
         self._residual = np.empty((count, 3))
         self._room = np.empty((most_threads(), SCRATCH))
         self._x = self._rest.copy()
+        self._shown = self._x
         self._from_rest = np.empty_like(self._rest)
         self._energy_terms = np.empty(len(self._mesh.terms.cells))
         self._goals = self._x[self._handles.places]
@@ -214,9 +215,9 @@ class ArapSolver:
             for _ in range(iterations):
                 self._local_step(self._x)
                 self._global_step()
-            shown = self._pose_step() if iterations else self._x
+            self._shown = self._pose_step() if iterations else self._x
             frame, order = self._frame, self._layout.order
-            place_outside(shown, order, frame.centre, frame.size, answer)
+            place_outside(self._shown, order, frame.centre, frame.size, answer)
         hard = self._handles.hard
         answer[self._layout.order[self._handles.places[hard]]] = goals[hard]
         return answer
@@ -230,19 +231,19 @@ class ArapSolver:
         return energy * self._frame.size**2
 
     def iron(self, answer: Floats) -> int:
-        """Lay flat what is folded in the answer (N, 3) of the last solve, in place.
+        """Lay flat what is folded in the answer (N, 3) that the last solve gave, in place.
 
         What goes on to the next frame is left as it is: see `solvers.creases`.
 
         Returns:
             How many triangles were folded.
         """
-        order = self._layout.order
-        np.take(answer, order, axis=0, out=self._from_rest)
+        frame, order = self._frame, self._layout.order
+        self._from_rest[:] = self._shown
         with threads_for(len(order)):
             folded = self._creases.iron(self._from_rest, self._R)
         if folded:
-            answer[order] = self._from_rest
+            place_outside(self._from_rest, order, frame.centre, frame.size, answer)
         return folded
 
     @cached_property

@@ -482,9 +482,7 @@ def test_a_show_publishes_its_performer_to_another(tmp_path: Path) -> None:
     try:
         url = endpoint_of(show)
         out = tmp_path / "heard.mcap"
-        assert (
-            main(["record", "--device", f"{url}?mode=lossless", str(out), "--seconds", "2"]) == 0
-        )
+        assert main(["record", "--device", f"{url}?mode=lossless", str(out), "--seconds", "2"]) == 0
     finally:
         show.kill()
         show.communicate()
