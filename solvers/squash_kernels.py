@@ -18,6 +18,7 @@ from numba import get_thread_id, prange  # type: ignore[attr-defined]
 from numpy.typing import NDArray
 
 from solvers.arap_cells import Cells
+from solvers.arap_kernels import covariances
 from solvers.compiled import kernel, parallel_kernel
 from solvers.laplacian import Floats
 from solvers.rotation_fit import LANES, fit_rotations
@@ -78,37 +79,6 @@ class Fit(NamedTuple):
     room: Floats
 
 
-@kernel
-def _covariances(x: Floats, cells: Cells, first: int, lanes: Floats, laplace_x: Floats) -> None:
-    """The covariances S of LANES cells into rows 0 to 8 of `lanes`; L x on the way."""
-    starts, neighbours, fits = cells.starts, cells.neighbours, cells.fits
-    for k in range(min(LANES, len(starts) - 1 - first)):
-        i = np.uint64(first + k)
-        x0, x1, x2 = x[i, 0], x[i, 1], x[i, 2]
-        s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = s8 = 0.0
-        l0 = l1 = l2 = 0.0
-        for h in range(np.uint64(starts[i]), np.uint64(starts[i + np.uint64(1)])):
-            j = np.uint64(neighbours[h])
-            d0, d1, d2 = x[j, 0] - x0, x[j, 1] - x1, x[j, 2] - x2
-            u0, u1, u2, w = fits[h, 0], fits[h, 1], fits[h, 2], fits[h, 3]
-            s0 += d0 * u0
-            s1 += d0 * u1
-            s2 += d0 * u2
-            s3 += d1 * u0
-            s4 += d1 * u1
-            s5 += d1 * u2
-            s6 += d2 * u0
-            s7 += d2 * u1
-            s8 += d2 * u2
-            l0 -= w * d0
-            l1 -= w * d1
-            l2 -= w * d2
-        lanes[k], lanes[LANES + k], lanes[2 * LANES + k] = s0, s1, s2
-        lanes[3 * LANES + k], lanes[4 * LANES + k], lanes[5 * LANES + k] = s3, s4, s5
-        lanes[6 * LANES + k], lanes[7 * LANES + k], lanes[8 * LANES + k] = s6, s7, s8
-        laplace_x[i, 0], laplace_x[i, 1], laplace_x[i, 2] = l0, l1, l2
-
-
 @parallel_kernel
 def rest_covariances(rest: Floats, cells: Cells, out: Fit) -> None:
     """The covariance of each cell's edges at rest, into out.matrices."""
@@ -116,7 +86,7 @@ def rest_covariances(rest: Floats, cells: Cells, out: Fit) -> None:
     count = len(cells.starts) - 1
     for block in prange((count + LANES - 1) // LANES):
         lanes, first = room[get_thread_id()], block * LANES
-        _covariances(rest, cells, first, lanes, laplace_x)
+        covariances(rest, cells, first, min(LANES, count - first), lanes, laplace_x)
         for k in range(min(LANES, count - first)):
             for entry in range(9):
                 matrices[first + k, entry] = lanes[entry * LANES + k]
@@ -132,7 +102,7 @@ def fit_scaled_cells(x: Floats, cells: Cells, planes: Planes, cartoon: float, ou
     count = len(cells.starts) - 1
     for block in prange((count + LANES - 1) // LANES):
         lanes, first = room[get_thread_id()], block * LANES
-        _covariances(x, cells, first, lanes, laplace_x)
+        covariances(x, cells, first, min(LANES, count - first), lanes, laplace_x)
         fit_rotations(lanes, min(LANES, count - first))
         _scale_block(lanes, first, planes, cartoon, (matrices, scales))
 
@@ -144,7 +114,7 @@ def scale_cells(x: Floats, cells: Cells, planes: Planes, cartoon: float, out: Fi
     count = len(cells.starts) - 1
     for block in prange((count + LANES - 1) // LANES):
         lanes, first = room[get_thread_id()], block * LANES
-        _covariances(x, cells, first, lanes, laplace_x)
+        covariances(x, cells, first, min(LANES, count - first), lanes, laplace_x)
         _load_rotations(lanes, first, matrices)
         _scale_block(lanes, first, planes, cartoon, (matrices, scales))
 
@@ -160,7 +130,7 @@ def fit_pose_cells(x: Floats, cells: Cells, planes: Planes, gain: float, out: Fi
     count = len(cells.starts) - 1
     for block in prange((count + LANES - 1) // LANES):
         lanes, first = room[get_thread_id()], block * LANES
-        _covariances(x, cells, first, lanes, laplace_x)
+        covariances(x, cells, first, min(LANES, count - first), lanes, laplace_x)
         fit_rotations(lanes, min(LANES, count - first))
         _pose_block(lanes, first, planes, gain, (matrices, scales))
 
@@ -172,7 +142,7 @@ def pose_cells(x: Floats, cells: Cells, planes: Planes, gain: float, out: Fit) -
     count = len(cells.starts) - 1
     for block in prange((count + LANES - 1) // LANES):
         lanes, first = room[get_thread_id()], block * LANES
-        _covariances(x, cells, first, lanes, laplace_x)
+        covariances(x, cells, first, min(LANES, count - first), lanes, laplace_x)
         _load_rotations(lanes, first, matrices)
         _pose_block(lanes, first, planes, gain, (matrices, scales))
 
