@@ -1,0 +1,115 @@
+"""What the values of options may be; each takes the text and gives the value.
+
+Raises:
+    argparse.ArgumentTypeError: one line that says what is expected.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import string
+
+
+def size(text: str) -> tuple[int, int]:
+    """A picture's width and height from ``WxH``."""
+    width, _, height = text.lower().partition("x")
+    try:
+        pair = int(width), int(height)
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"expected WIDTHxHEIGHT, as in 960x540, got {text!r}"
+        ) from None
+    if not (16 <= pair[0] <= 8192 and 16 <= pair[1] <= 8192):
+        raise argparse.ArgumentTypeError(f"each side must be 16 to 8192 pixels, got {text!r}")
+    return pair
+
+
+def positive(text: str) -> float:
+    """A finite number above 0."""
+    try:
+        value = float(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected a number above 0, got {text!r}") from None
+    if not 0.0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"expected a finite number above 0, got {text!r}")
+    return value
+
+
+def counting(text: str) -> int:
+    """A whole number from 1."""
+    try:
+        value = int(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 1, got {text!r}") from None
+    if not 1 <= value <= 1_000_000:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 1, got {text!r}")
+    return value
+
+
+def whole(text: str) -> int:
+    """A whole number from 0."""
+    if not (text.isascii() and text.isdigit() and len(text) < 10):
+        raise argparse.ArgumentTypeError(f"expected a whole number from 0, got {text!r}")
+    return int(text)
+
+
+def share(text: str) -> float:
+    """A number from 0 to 1."""
+    return _between(text, 0.0, 1.0)
+
+
+def stiffness(text: str) -> float:
+    """A number from 0 to 0.99."""
+    return _between(text, 0.0, 0.99)
+
+
+def gain(text: str) -> float:
+    """A number from 0 to 10."""
+    return _between(text, 0.0, 10.0)
+
+
+def _between(text: str, least: float, most: float) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not least <= value <= most:
+        raise argparse.ArgumentTypeError(
+            f"expected a number from {least:g} to {most:g}, got {text!r}"
+        )
+    return value
+
+
+def colour(text: str) -> tuple[int, int, int]:
+    """Red, green and blue in sRGB bytes, from ``#rrggbb``, ``#rgb`` or ``chroma``."""
+    if text.lower() == "chroma":
+        return 0, 255, 0
+    digits = text.removeprefix("#")
+    if len(digits) == 3:
+        digits = "".join(2 * digit for digit in digits)
+    if len(digits) != 6 or not set(digits) <= set(string.hexdigits):
+        raise argparse.ArgumentTypeError(f"expected chroma or a colour as in #203040, got {text!r}")
+    red, green, blue = bytes.fromhex(digits)
+    return red, green, blue
+
+
+def host_port(text: str) -> tuple[str, int | None]:
+    """A host and a port from ``HOST:PORT``; None where there is no port."""
+    host, colon, port = text.rpartition(":") if text.count(":") == 1 else (text, "", "")
+    host = host.removeprefix("[").removesuffix("]")
+    if not host or (colon and not (port.isdecimal() and 1 <= int(port) <= 65535)):
+        raise argparse.ArgumentTypeError(f"expected HOST:PORT, as in 127.0.0.1:39539, got {text!r}")
+    return host, int(port) if colon else None
+
+
+def remote_address(text: str) -> tuple[str, int | None]:
+    """A host and a port to be run from; ``osc://`` before them is no harm."""
+    return host_port(text.removeprefix("osc://"))
+
+
+def port_number(text: str) -> int:
+    """A port from 1 to 65535."""
+    if not (text.isascii() and text.isdecimal() and 1 <= int(text[:6]) <= 65535):
+        raise argparse.ArgumentTypeError(f"expected a port from 1 to 65535, got {text!r}")
+    return int(text)
