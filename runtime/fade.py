@@ -32,7 +32,8 @@ class Fade:
         if share >= 1.0:
             return self.target
         share = max(share, 0.0)
-        return self._from + (self.target - self._from) * share * share * (3.0 - 2.0 * share)
+        level = self._from + (self.target - self._from) * share * share * (3.0 - 2.0 * share)
+        return min(max(level, 0.0), 1.0)  # whatever rounding makes of its ends
 
     def to(self, target: float) -> None:
         """Go to `target` from now on."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from runtime.fade import Fade
@@ -36,6 +36,7 @@ def test_it_takes_its_time_and_is_half_way_in_the_middle() -> None:
     assert fade.level == 0.0
 
 
+@example([(0.109375, 1.0), (0.5, 0.0)])
 @given(st.lists(st.tuples(st.floats(0.0, 0.5), st.sampled_from([0.0, 1.0])), max_size=20))
 def test_it_never_jumps_however_often_it_is_turned_round(turns: list[tuple[float, float]]) -> None:
     clock = Clock()
