@@ -13,6 +13,7 @@ so badly conditioned that this would not do is kept in double.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -184,13 +185,19 @@ def _plan(entries: Entries, tree: Dissection) -> tuple[Blocks, Schedule, Updates
     )
 
 
+@lru_cache(maxsize=8)
+def _probe(count: int) -> Floats:
+    """An error to be solved for (n, 3), always the same."""
+    return np.random.default_rng(0).standard_normal((count, 3))
+
+
 def _lost_share(matrix: sp.csr_matrix, factor: BlockFactor, rounds: int) -> float:
     """The share of an error, in the matrix's norm, that a solve leaves of it; the worst of a few.
 
     A step that corrects by this solve descends on the quadratic form as long as the share is below
     one. Each round starts from what the last one left, which is what the solve is worst at.
     """
-    error = np.random.default_rng(0).standard_normal((matrix.shape[0], 3))
+    error = _probe(matrix.shape[0]).copy()
     found = np.empty_like(error)
     worst = 0.0
     for _ in range(rounds):

@@ -17,7 +17,7 @@ from solvers.handles import Handles
 from solvers.held_system import HeldSystem
 from solvers.laplacian import Floats, Ints
 
-ROUNDS = 2  # of three groups each, in a tick
+ROUNDS = 1  # of three groups each, in a tick
 
 
 class Following:
