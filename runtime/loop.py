@@ -87,6 +87,7 @@ class FrameLoop:
         self._timer = StageTimer()
         self._poses: list[Pose | None] = [None] * len(self._acts)
         self._motions = [puppet.deform() for act in self._acts for puppet in act.puppets]
+        self._unsettled = False
 
     def tick(self) -> bool:
         """Do what has come since the last tick; draw in any case where somebody looks.
@@ -94,6 +95,7 @@ class FrameLoop:
         Returns:
             Whether a frame was performed.
         """
+        self.settle()
         self._timer.reset()
         with self._timer.stage("frame"):
             with self._timer.stage("poll"):
@@ -106,6 +108,19 @@ class FrameLoop:
             for stage, spent in self._timer.stages.items():
                 self._report.times.add(stage, spent)
         return newest is not None
+
+    def settle(self) -> None:
+        """Bring the surfaces nearer to rest once a tick has been shown, before the next is due.
+
+        The next tick would begin with it otherwise: what is shown is the same.
+        """
+        if not self._unsettled:
+            return
+        self._unsettled = False
+        with self._report.times.measure("settle"):
+            for act in self._acts:
+                for puppet in act.puppets:
+                    puppet.settle()
 
     def _idle(self) -> None:
         """Go on showing what there is, though no frame has come: camera and light may change."""
@@ -154,6 +169,7 @@ class FrameLoop:
                     motions.append(puppet.deform())
         if not self.frozen:
             self._motions = motions
+            self._unsettled = True
         self._publish(frame.time)
         self._began = frame.time if self.frames == 0 else self._began
         self.seconds = frame.time - self._began

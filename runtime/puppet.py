@@ -71,7 +71,8 @@ class Puppet:
 
     Args:
         character: who performs.
-        iterations: of the solver, a frame.
+        iterations: of the solver, a frame; where there are several, the last comes after the
+            surface is shown: see `settle`.
         energy: what is kept as rigid as possible: see `ArapSolver`.
 
     Attributes:
@@ -293,7 +294,18 @@ class Puppet:
             self.skin.weigh(np.append(self._grip.weights, HARD)[self._limb_of_anchor])
         strain = self._strain()
         self._positions = self._stretched(strain)
-        return self._with_body(self.skin.deform(self._anchors(strain), self.iterations))
+        return self._with_body(self.skin.deform(self._anchors(strain), self._before_shown))
+
+    def settle(self) -> None:
+        """Take the iterations that are left of this frame, now that the surface has been shown.
+
+        A frame is seen an iteration earlier, and the next starts as near as if it had waited.
+        """
+        self.skin.settle(self.iterations - self._before_shown)
+
+    @property
+    def _before_shown(self) -> int:
+        return max(self.iterations - 1, 1)
 
     def _strain(self) -> Strain:
         """How far the character's own motion stretches it."""

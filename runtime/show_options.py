@@ -122,7 +122,7 @@ def _add_match(parser: argparse.ArgumentParser) -> None:
         type=counting,
         default=2,
         metavar="N",
-        help="ARAP iterations a frame (default 2)",
+        help="ARAP iterations a frame, the last of several after it is shown (default 2)",
     )
 
 

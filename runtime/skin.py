@@ -158,6 +158,10 @@ class Skin:
         self._solver.iron(self._answer)
         return self._answer
 
+    def settle(self, iterations: int) -> None:
+        """Bring the surface nearer to what its anchors ask for; what was given out stays."""
+        self._solver.settle(iterations)
+
     def cover(self, deformed: Array) -> Array:
         """Give the character's own vertices (N, 3) [m] that go with the deformed surface (C, 3).
 

@@ -48,8 +48,9 @@ ENERGIES = (SPOKES, SPOKES_AND_RIMS, SMOOTH_ROTATIONS)
 _JUMP_ANGLE = math.radians(30.0)
 _JUMP_PATH = 0.1
 
-# Small steps add up: while the handles move, the rest pose is tried every so many frames. A group
-# that turned or went less than this (radians, sizes) stood still.
+# Small steps add up: while the handles move, the rest pose is tried every so many frames, between
+# two of them where somebody settles there. A group that turned or went less than this (radians,
+# sizes) stood still.
 _CHECKED = 8
 _STILL = 1e-4
 
@@ -222,6 +223,19 @@ class ArapSolver:
         answer[self._layout.order[self._handles.places[hard]]] = goals[hard]
         return answer
 
+    def settle(self, iterations: int = 1) -> None:
+        """Take `iterations` more steps to the targets of the last solve, whose answer is out.
+
+        For the time between two frames: the next solve starts from there. What a solve would now
+        and then have to do first, trying the rest pose, is done here.
+        """
+        with threads_for(len(self._x)):
+            if self._has_moved and self._frames_since >= _CHECKED:
+                self._try_from_rest(self._goals, _MUCH_BETTER)
+            for _ in range(iterations):
+                self._local_step(self._x)
+                self._global_step()
+
     @property
     def energy(self) -> float:
         """The energy of the last answer under its best rotations, in the vertices' unit squared."""
@@ -291,13 +305,14 @@ class ArapSolver:
         self._put_held(goals, self._x)
         self._frames_since += 1
         self._has_moved |= angle > _STILL or path > _STILL
-        has_jumped = angle > _JUMP_ANGLE or path > _JUMP_PATH
-        if has_jumped or (self._has_moved and self._frames_since >= _CHECKED):
-            self._frames_since, self._has_moved = 0, False
-            self._try_from_rest(goals, _BETTER if has_jumped else _MUCH_BETTER)
+        if angle > _JUMP_ANGLE or path > _JUMP_PATH:
+            self._try_from_rest(goals, _BETTER)
+        elif self._has_moved and self._frames_since > _CHECKED:
+            self._try_from_rest(goals, _MUCH_BETTER)
 
     def _try_from_rest(self, goals: Floats, share: float) -> None:
         """Start from the rest pose, moved along, if its energy is under a share of that of x."""
+        self._frames_since, self._has_moved = 0, False
         following, ties = self._following, self._priors.is_on
         whole = following.motions(self._rest[self._handles.places], goals)
         follow(self._rest, following.influences, whole, self._from_rest)

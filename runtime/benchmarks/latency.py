@@ -208,6 +208,7 @@ class _Show:
             pace.wait()
             with held():
                 performed = self._loop.tick()
+            self._loop.settle()
             if performed and stream.newest is not None:
                 heard = time.perf_counter()
                 newest = stream.newest

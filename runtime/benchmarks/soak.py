@@ -118,6 +118,7 @@ def soaked(path: Path, seconds: float, *, real_time: bool) -> Soak:
         for tick in range(ticks):
             began = time.perf_counter()
             loop.tick()
+            loop.settle()
             spent[tick] = time.perf_counter() - began
             if tick % TICKS_A_SAMPLE == 0:
                 memory[tick // TICKS_A_SAMPLE] = resident_memory()

@@ -24,16 +24,18 @@ def run() -> dict[str, object]:
     print(f"tick: budget {BUDGET_MS['p50']} ms median, {BUDGET_MS['p99']} ms p99, 10k vertices")
     print(
         f"{'character':>10} {'vertices':>8} {'iters':>5} {'frame p50':>10} {'p99':>7} {'deform':>7}"
+        f" {'then settle p50':>16} {'p99':>7}"
     )
     figures: dict[str, object] = {}
     for name in BUILTIN:
         for iterations in ITERATIONS:
             stages = _replay(name, iterations)
             vertices = len(builtin_character(name).vertices)
-            frame, deform = stages["frame"], stages["deform"]
+            frame, deform, settle = stages["frame"], stages["deform"], stages["settle"]
             print(
                 f"{name:>10} {vertices:>8} {iterations:>5} {frame['p50']:>10.2f}"
-                f" {frame['p99']:>7.2f} {deform['p50']:>7.2f}"
+                f" {frame['p99']:>7.2f} {deform['p50']:>7.2f} {settle['p50']:>16.2f}"
+                f" {settle['p99']:>7.2f}"
             )
             figures[f"{name}, {iterations} iterations"] = stages
     return {"budget_ms": BUDGET_MS, "stages_ms": figures}
@@ -60,4 +62,5 @@ def _replay(name: str, iterations: int) -> dict[str, dict[str, float]]:
         )
         while not player.ended:
             loop.tick()
+            loop.settle()
     return report.times.summary()

@@ -193,6 +193,7 @@ class _Show:
                 controls.serve()
             if self._remote is not None:
                 self._remote.serve(desk)
+            loop.settle()
             if pace is not None:
                 pace.wait()
 

@@ -9,7 +9,7 @@ from time import perf_counter
 
 import numpy as np
 
-STAGES = ("poll", "match", "retarget", "deform", "render", "publish", "frame")
+STAGES = ("poll", "match", "retarget", "deform", "render", "publish", "frame", "settle")
 
 _FIRST = 1e-4  # [ms] what is shorter counts as this
 _BINS_A_FOLD = 200  # for every factor of e: a bin is half a percent wide
@@ -21,7 +21,7 @@ class StageTimes:
 
     A histogram whose bins are half a percent wide, and the longest sample as it was. The stages are
     those of the report: ``poll``, ``match``, ``retarget``, ``deform``, ``render``, ``publish`` for
-    the outputs, and ``frame`` for all of a tick.
+    the outputs, ``frame`` for all of a tick, and ``settle`` for what comes after it.
     """
 
     def __init__(self) -> None:

@@ -157,7 +157,7 @@ def test_all_stages_are_timed_once_a_frame(puppet: Puppet) -> None:
     loop.tick()
     stages = {name: int(counts.sum()) for name, counts in report.times._counts.items()}
     assert stages == dict.fromkeys(
-        ("poll", "match", "retarget", "deform", "render", "publish", "frame"), 5
+        ("poll", "match", "retarget", "deform", "render", "publish", "frame", "settle"), 5
     )
 
 
@@ -183,6 +183,20 @@ def test_two_replays_are_the_same_to_the_last_bit(puppet: Puppet) -> None:
         play(loop_of(player, [puppet], [[kept]]), player)
         runs.append(np.array([frame.vertices for frame in kept.frames]))
     np.testing.assert_array_equal(*runs)
+
+
+def test_it_does_not_matter_to_what_is_shown_who_settles_and_when(puppet: Puppet) -> None:
+    shown = []
+    for settles in (True, False):
+        player, kept = Player(record(waving(9)), EveryFrame()), Kept()
+        loop = loop_of(player, [puppet], [[kept]])
+        while not player.ended:
+            loop.tick()
+            if settles:
+                loop.settle()
+                loop.settle()  # once is enough
+        shown.append(np.array([frame.vertices for frame in kept.frames]))
+    np.testing.assert_array_equal(*shown)
 
 
 def test_what_a_slow_loop_skips_is_counted_and_recorded(puppet: Puppet) -> None:

@@ -231,6 +231,34 @@ def test_two_runs_agree_to_the_last_bit():
     assert perform() == first
 
 
+@pytest.mark.parametrize("energy", ["spokes", "spokes-and-rims", "smooth-rotations"])
+def test_an_iteration_after_the_answer_counts_as_one_before_it(energy: str):
+    vertices, faces = bar()
+    handles, groups = ends(vertices)
+    goals = bent(vertices, handles, groups, 0.3)
+    waiting, early = (ArapSolver(vertices, faces, handles, energy=energy) for _ in range(2))
+    wanted = waiting.solve(goals, 3)
+    given = early.solve(goals, 1)
+    shown = given.copy()
+    early.settle(2)
+    np.testing.assert_array_equal(given, shown)  # what was given out stays
+    np.testing.assert_allclose(early.solve(goals, 0), wanted, rtol=0, atol=1e-12)
+
+
+def test_who_settles_finds_the_way_back_to_rest_between_frames():
+    vertices, faces = bar(rings=20, around=8)
+    handles, groups = ends(vertices)
+    solver = ArapSolver(vertices, faces, handles, groups=groups)
+    for degrees in 29.0 * np.arange(1, 9):  # the end of a bar, over half a turn; none is a jump
+        goals = vertices[handles].copy()
+        turn = Rotation.from_rotvec([np.radians(degrees), 0.0, 0.0])
+        goals[groups == 1] = turn.apply(goals[groups == 1])
+        solver.solve(goals, 1)
+    twisted = solver.energy
+    solver.settle(4)
+    assert solver.energy < 0.5 * twisted  # it is less far the other way round
+
+
 def test_reset_forgets():
     vertices, faces = bar()
     handles, groups = ends(vertices)
