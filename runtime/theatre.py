@@ -107,13 +107,14 @@ class Theatre:
 
     def upload(self, motions: Sequence[Motion]) -> None:
         """Give the GPU the puppets as they are now."""
-        for actor, puppet, motion in zip(self._actors, self._puppets, motions, strict=True):
+        for actor, motion in zip(self._actors, motions, strict=True):
             actor.update(motion.vertices)
-            chains = puppet.chains if self.highlights else []
-            actor.highlight(chains, _colours(len(chains)))
 
     def draw(self, pose: Pose | None) -> None:
-        """Draw what was uploaded, and the performer in the mirror."""
+        """Draw what was uploaded, the chains as they are now, and the performer in the mirror."""
+        for actor, puppet in zip(self._actors, self._puppets, strict=True):
+            chains = puppet.chains if self.highlights else []
+            actor.highlight(chains, _colours(len(chains)))
         if self._inset is not None and pose is not None:
             self._inset.update(
                 pose.seen,
@@ -145,8 +146,9 @@ def _side_by_side(characters: Sequence[Character]) -> list[float]:
     return [place - middle for place in places]
 
 
-def _colours(count: int) -> list[NDArray[np.float64]]:
-    return [PAIR_COLOURS[index % len(PAIR_COLOURS)] for index in range(count)]
+def _colours(count: int) -> NDArray[np.float64]:
+    """Linear RGB (C, 3) of so many chains."""
+    return PAIR_COLOURS[np.arange(count) % len(PAIR_COLOURS)]
 
 
 def _joint_colours(joints: int, mapping: Mapping) -> NDArray[np.float64]:

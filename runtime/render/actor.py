@@ -82,6 +82,7 @@ class Actor:
         self._tubes = chain_tubes([], [], 0.01)
         self.update(character.vertices)
         self.rest_box = self._box
+        self._tube_radius = 0.012 * float(np.ptp(self.rest_box, axis=0).max())
 
     def _vertex_arrays(self) -> dict[str, moderngl.VertexArray]:
         position = (self._moving, "3f 12x", "in_position")
@@ -114,15 +115,17 @@ class Actor:
         self._moving.write(self._normals.fill(vertices))
         self._box = bounding_box(vertices)
 
-    def highlight(self, chains: Sequence[ArrayLike], colours: Sequence[ArrayLike]) -> None:
+    def highlight(self, chains: Sequence[ArrayLike], colours: ArrayLike) -> None:
         """Light up polylines inside the surface; visible through it. No chains: none.
 
         Args:
             chains: each (K, 3) [m], in the character's stage coordinates.
-            colours: linear RGB of each chain.
+            colours: (C, 3) linear RGB of each chain.
+
+        Raises:
+            ValueError: not as many colours as chains.
         """
-        height = float(np.ptp(self.rest_box, axis=0).max())
-        self._tubes = chain_tubes(chains, colours, 0.012 * height)
+        self._tubes = chain_tubes(chains, colours, self._tube_radius)
 
     @property
     def tubes(self) -> NDArray[np.float32]:

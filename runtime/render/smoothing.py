@@ -16,6 +16,11 @@ from solvers.compiled import kernel
 
 CREASE = math.radians(62.0)
 
+# Faces are worked on LANES at a time, in a flat array of 6 rows of LANES numbers. With a single
+# array and constant strides the compiler can prove that nothing overlaps, which it needs in order
+# to use vector instructions (as solvers/rotation_fit.py does).
+LANES = 64
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawVertices:
@@ -27,8 +32,7 @@ class DrawVertices:
         group: (D,) int32; smoothing group that it takes its normal from.
         triangles: (F, 3) int32 into the D drawn vertices, in the character's face order.
         faces: (F, 3) int32 into the welded vertices.
-        group_start: (G + 1,) int32; group g is the corners `group_corners[start[g]:start[g + 1]]`.
-        group_corners: (3 F,) int32; corner 3 f + k is the k-th of face f.
+        corner_group: (F, 3) int32; smoothing group that each corner of a face adds to.
     """
 
     welded: NDArray[np.int32]
@@ -36,8 +40,7 @@ class DrawVertices:
     group: NDArray[np.int32]
     triangles: NDArray[np.int32]
     faces: NDArray[np.int32]
-    group_start: NDArray[np.int32]
-    group_corners: NDArray[np.int32]
+    corner_group: NDArray[np.int32]
 
 
 def split_vertices(character: Character, *, crease: float = CREASE) -> DrawVertices:
@@ -48,16 +51,13 @@ def split_vertices(character: Character, *, crease: float = CREASE) -> DrawVerti
     file = np.asarray(surface.faces, dtype=np.int64).reshape(-1)
     key = file * (int(group.max(initial=0)) + 1) + group
     _, first, triangles = np.unique(key, return_index=True, return_inverse=True)
-    corners = np.argsort(group, kind="stable").astype(np.int32)
-    sizes = np.bincount(group)
     return DrawVertices(
         welded=surface.vertex[file[first]].astype(np.int32),
         file=file[first],
         group=group[first],
         triangles=triangles.reshape(-1, 3).astype(np.int32),
         faces=faces,
-        group_start=np.concatenate([[0], np.cumsum(sizes)]).astype(np.int32),
-        group_corners=corners,
+        corner_group=group.reshape(-1, 3),
     )
 
 
@@ -118,27 +118,27 @@ class DeformingNormals:
     """Fills the vertex buffer of a deforming surface; keeps its scratch from frame to frame.
 
     A normal is the sum of its smoothing group's face normals, each weighted by the face's angle
-    there, so that it does not depend on how the surface was cut into triangles. Sums run in a
-    fixed order: two runs agree to the last bit.
+    there, so that it does not depend on how the surface was cut into triangles. Sums run in the
+    order of the faces: two runs agree to the last bit.
 
     Source: Thurmer and Wuthrich, Computing Vertex Normals from Polygonal Facets, 1998, section 2.
     """
 
     def __init__(self, split: DrawVertices) -> None:
         self._split = split
-        self._corners = np.zeros((3 * len(split.faces), 3))
-        self._groups = np.zeros((len(split.group_start) - 1, 3), dtype=np.float32)
+        self._lanes = np.zeros(6 * LANES)
+        self._sums = np.zeros((int(split.corner_group.max(initial=-1)) + 1, 3))
         self._out = np.zeros((len(split.welded), 6), dtype=np.float32)
 
     def fill(self, vertices: NDArray[np.float64]) -> NDArray[np.float32]:
         """Position and unit normal (D, 6) of each drawn vertex, for welded vertices (N, 3).
 
-        The array is overwritten by the next call.
+        A normal is zero where all faces of its group are without area. The array is overwritten
+        by the next call.
         """
         split = self._split
-        _weigh_corners(vertices, split.faces, self._corners)
-        _sum_groups(split.group_start, split.group_corners, self._corners, self._groups)
-        _expand(vertices, self._groups, split.welded, split.group, self._out)
+        _sum_corners(vertices, split.faces, split.corner_group, self._lanes, self._sums)
+        _expand(vertices, self._sums, split.welded, split.group, self._out)
         return self._out
 
 
@@ -160,68 +160,108 @@ def _angle(x: float, y: float) -> float:
 
 
 @kernel
-def _weigh_corners(
-    vertices: NDArray[np.float64], faces: NDArray[np.int32], out: NDArray[np.float64]
+def _sum_corners(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    corner_group: NDArray[np.int32],
+    lanes: NDArray[np.float64],
+    sums: NDArray[np.float64],
 ) -> None:
-    """Each corner's face normal times its angle (3 F, 3); nothing where a face has no area."""
-    for f in range(faces.shape[0]):
-        a, b, c = vertices[faces[f, 0]], vertices[faces[f, 1]], vertices[faces[f, 2]]
-        ux, uy, uz = b[0] - a[0], b[1] - a[1], b[2] - a[2]
-        vx, vy, vz = c[0] - a[0], c[1] - a[1], c[2] - a[2]
+    """Sum up the weighted normals of each group's corners, sums (G, 3), in the order of faces."""
+    sums[:] = 0.0
+    count = faces.shape[0]
+    for first in range(0, count, LANES):
+        size = min(LANES, count - first)
+        _gather_edges(vertices, faces, first, size, lanes)
+        _weigh(lanes, size)
+        _scatter(lanes, corner_group, first, size, sums)
+
+
+@kernel
+def _gather_edges(
+    vertices: NDArray[np.float64],
+    faces: NDArray[np.int32],
+    first: int,
+    size: int,
+    lanes: NDArray[np.float64],
+) -> None:
+    """Rows 0 to 2 of `lanes`: a face's edge from its first corner to its second; 3 to 5: third."""
+    for k in range(size):
+        f = np.uint64(first + k)
+        a, b, c = np.uint64(faces[f, 0]), np.uint64(faces[f, 1]), np.uint64(faces[f, 2])
+        x, y, z = vertices[a, 0], vertices[a, 1], vertices[a, 2]
+        lanes[k] = vertices[b, 0] - x
+        lanes[LANES + k] = vertices[b, 1] - y
+        lanes[2 * LANES + k] = vertices[b, 2] - z
+        lanes[3 * LANES + k] = vertices[c, 0] - x
+        lanes[4 * LANES + k] = vertices[c, 1] - y
+        lanes[5 * LANES + k] = vertices[c, 2] - z
+
+
+@kernel
+def _weigh(lanes: NDArray[np.float64], size: int) -> None:
+    """Turn edges into unit normals (rows 0 to 2) and angles (3 to 5); 0 for faces without area."""
+    for k in range(size):
+        ux, uy, uz = lanes[k], lanes[LANES + k], lanes[2 * LANES + k]
+        vx, vy, vz = lanes[3 * LANES + k], lanes[4 * LANES + k], lanes[5 * LANES + k]
         nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
         double_area = math.sqrt(nx * nx + ny * ny + nz * nz)
-        if double_area == 0.0:
-            out[3 * f : 3 * f + 3] = 0.0
-            continue
         uv, uu = ux * vx + uy * vy + uz * vz, ux * ux + uy * uy + uz * uz
-        at_a = _angle(uv, double_area) / double_area
-        at_b = _angle(uu - uv, double_area) / double_area
-        at_c = math.pi / double_area - at_a - at_b
-        for corner, weight in ((3 * f, at_a), (3 * f + 1, at_b), (3 * f + 2, at_c)):
-            out[corner, 0], out[corner, 1], out[corner, 2] = nx * weight, ny * weight, nz * weight
+        at_a, at_b = _angle(uv, double_area), _angle(uu - uv, double_area)
+        # Selected and not branched to, so that whole vectors of faces stay in step.
+        flat = double_area == 0.0
+        scale = 0.0 if flat else 1.0 / double_area
+        at_a, at_b = 0.0 if flat else at_a, 0.0 if flat else at_b
+        lanes[k], lanes[LANES + k], lanes[2 * LANES + k] = nx * scale, ny * scale, nz * scale
+        lanes[3 * LANES + k], lanes[4 * LANES + k] = at_a, at_b
+        lanes[5 * LANES + k] = math.pi - at_a - at_b
 
 
-@njit(cache=True, error_model="numpy")
-def _sum_groups(
-    start: NDArray[np.int32],
-    corners: NDArray[np.int32],
-    weighted: NDArray[np.float64],
-    out: NDArray[np.float32],
+@kernel
+def _scatter(
+    lanes: NDArray[np.float64],
+    corner_group: NDArray[np.int32],
+    first: int,
+    size: int,
+    sums: NDArray[np.float64],
 ) -> None:
-    """Unit normal (G, 3) of each smoothing group; zero where all its faces are degenerate."""
-    for g in range(start.shape[0] - 1):
-        x = y = z = 0.0
-        for i in range(start[g], start[g + 1]):
-            x += weighted[corners[i], 0]
-            y += weighted[corners[i], 1]
-            z += weighted[corners[i], 2]
-        length = max(math.sqrt(x * x + y * y + z * z), 1e-30)
-        out[g, 0] = x / length
-        out[g, 1] = y / length
-        out[g, 2] = z / length
+    """Add each corner's normal, weighted by its angle, to its group's sum."""
+    for k in range(size):
+        f = np.uint64(first + k)
+        x, y, z = lanes[k], lanes[LANES + k], lanes[2 * LANES + k]
+        for corner in range(3):
+            g = np.uint64(corner_group[f, corner])
+            angle = lanes[(3 + corner) * LANES + k]
+            sums[g, 0] += x * angle
+            sums[g, 1] += y * angle
+            sums[g, 2] += z * angle
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _expand(
     vertices: NDArray[np.float64],
-    normals: NDArray[np.float32],
+    sums: NDArray[np.float64],
     welded: NDArray[np.int32],
     group: NDArray[np.int32],
     out: NDArray[np.float32],
 ) -> None:
+    """Position and unit normal of each drawn vertex, out (D, 6)."""
     for d in range(welded.shape[0]):
-        for axis in range(3):
-            out[d, axis] = vertices[welded[d], axis]
-            out[d, 3 + axis] = normals[group[d], axis]
+        v, g = np.uint64(welded[d]), np.uint64(group[d])
+        x, y, z = sums[g, 0], sums[g, 1], sums[g, 2]
+        scale = 1.0 / max(math.sqrt(x * x + y * y + z * z), 1e-30)
+        out[d, 0], out[d, 1], out[d, 2] = vertices[v, 0], vertices[v, 1], vertices[v, 2]
+        out[d, 3], out[d, 4], out[d, 5] = x * scale, y * scale, z * scale
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def bounding_box(vertices: NDArray[np.float64]) -> NDArray[np.float64]:
     """(2, 3) least and greatest corner of (N, 3) points."""
-    box = np.empty((2, 3))
-    for axis in range(3):
-        low = high = vertices[0, axis]
-        for i in range(vertices.shape[0]):
-            low, high = min(low, vertices[i, axis]), max(high, vertices[i, axis])
-        box[0, axis], box[1, axis] = low, high
-    return box
+    x0 = x1 = vertices[0, 0]
+    y0 = y1 = vertices[0, 1]
+    z0 = z1 = vertices[0, 2]
+    for i in range(vertices.shape[0]):
+        x, y, z = vertices[i, 0], vertices[i, 1], vertices[i, 2]
+        x0, y0, z0 = min(x0, x), min(y0, y), min(z0, z)
+        x1, y1, z1 = max(x1, x), max(y1, y), max(z1, z)
+    return np.array([[x0, y0, z0], [x1, y1, z1]])

@@ -51,22 +51,30 @@ def tubes(
     return packed
 
 
-def chain_tubes(chains: Sequence[ArrayLike], colours: Sequence[ArrayLike], radius: float) -> Tubes:
+def chain_tubes(chains: Sequence[ArrayLike], colours: ArrayLike, radius: float) -> Tubes:
     """Glowing rods with beads along polylines, each (K, 3): first all glow, then rods, then beads.
 
     Raises:
         ValueError: not as many colours as chains.
     """
-    layers: tuple[list[Tubes], ...] = ([], [], [])
-    for chain, colour in zip(chains, colours, strict=True):
-        nodes = np.asarray(chain, dtype=np.float64).reshape(-1, 3)
-        rgb = np.asarray(colour, dtype=np.float64)[:3]
-        pale = 0.75 * rgb + 0.25
-        layers[0].append(tubes(nodes[:-1], nodes[1:], radius, rgb, opacity=0.55, glow=GLOW_REACH))
-        layers[1].append(tubes(nodes[:-1], nodes[1:], radius * 0.62, rgb, opacity=0.95))
-        layers[2].append(tubes(nodes, nodes, radius * 1.25, pale))
-    everything = [tube for layer in layers for tube in layer]
-    return np.vstack(everything) if everything else np.empty((0, 13), dtype=np.float32)
+    rgb = np.asarray(colours, dtype=np.float64).reshape(-1, 3)
+    if len(rgb) != len(chains):
+        raise ValueError(f"Expected `colours` to have shape ({len(chains)}, 3), got {rgb.shape}")
+    if not chains:
+        return np.empty((0, 13), dtype=np.float32)
+    polylines = [np.asarray(chain, dtype=np.float64).reshape(-1, 3) for chain in chains]
+    nodes = np.concatenate(polylines)
+    chain_of = np.repeat(np.arange(len(chains)), [len(polyline) for polyline in polylines])
+    rod = np.flatnonzero(chain_of[1:] == chain_of[:-1])  # from a node to the next of its chain
+    start, end, colour = nodes[rod], nodes[rod + 1], rgb[chain_of[rod]]
+    pale = 0.75 * rgb[chain_of] + 0.25
+    return np.concatenate(
+        [
+            tubes(start, end, radius, colour, opacity=0.55, glow=GLOW_REACH),
+            tubes(start, end, radius * 0.62, colour, opacity=0.95),
+            tubes(nodes, nodes, radius * 1.25, pale),
+        ]
+    )
 
 
 class TubePainter:
