@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.compiled import kernel
 from solvers.springs import Springs
 
 Array = NDArray[np.float64]
@@ -44,6 +45,10 @@ class Strain:
         """Whether nothing is stretched at all."""
         return self.body == 1.0 and bool((self.limbs == 1.0).all())
 
+    def of_limbs(self, limbs: NDArray[np.int64]) -> Array:
+        """The lengths (n,) of these limbs, as shares of their own; -1 is none, never stretched."""
+        return np.append(self.limbs, 1.0)[limbs]
+
 
 class Exaggeration:
     """Follows how fast a character moves.
@@ -54,10 +59,8 @@ class Exaggeration:
     """
 
     def __init__(self, lengths: Array, height: float) -> None:
-        self._lengths = np.maximum(lengths, 1e-9)
-        self._height = max(height, 1e-9)
-        self._limbs = Springs(np.zeros(len(lengths)), frequency=FREQUENCY, damping=DAMPING)
-        self._body = Springs(0.0, frequency=FREQUENCY, damping=DAMPING)
+        self._sizes = np.maximum(np.append(lengths, height), 1e-9)
+        self._springs = Springs(np.zeros(len(lengths) + 1), frequency=FREQUENCY, damping=DAMPING)
         self._before: tuple[float, Array, float] | None = None
 
     def strain(self, time: float, tips: Array, lift: float, amount: float) -> Strain:
@@ -70,14 +73,22 @@ class Exaggeration:
             amount: from 0, not at all, to 1.
         """
         passed = math.inf if self._before is None else time - self._before[0]
-        limbs, body = np.zeros(len(self._lengths)), 0.0
+        pulls = np.zeros(len(self._sizes))
         if self._before is not None and 0.0 < passed <= LONGEST_STEP:
             _, tips_before, lift_before = self._before
-            speeds = np.linalg.norm(tips - tips_before, axis=1) / self._lengths / passed
-            limbs = LIMB * np.tanh((speeds / FAST_LIMB) ** 2)
-            body = BODY * math.tanh(abs(lift - lift_before) / self._height / passed / FAST_BODY)
+            _pull(tips - tips_before, lift - lift_before, self._sizes, passed, pulls)
         self._before = (time, tips.copy(), lift)
         if 0.0 < passed < math.inf:
-            self._limbs.step(limbs, passed)
-            self._body.step(body, passed)
-        return Strain(1.0 + amount * self._limbs.at, 1.0 + amount * float(self._body.at))
+            self._springs.step(pulls, passed)
+        lengths = 1.0 + amount * self._springs.at
+        return Strain(lengths[:-1], float(lengths[-1]))
+
+
+@kernel
+def _pull(tips: Array, lift: float, sizes: Array, passed: float, out: Array) -> None:
+    """By how much each limb, and last the body, would grow (D + 1,) that moved so far [m]."""
+    count = len(tips)
+    for d in range(count):
+        far = math.sqrt(tips[d, 0] ** 2 + tips[d, 1] ** 2 + tips[d, 2] ** 2)
+        out[d] = LIMB * math.tanh((far / sizes[d] / passed / FAST_LIMB) ** 2)
+    out[count] = BODY * math.tanh(abs(lift) / sizes[count] / passed / FAST_BODY)

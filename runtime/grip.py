@@ -38,13 +38,15 @@ class Grip:
         self.weights: Array = np.full(count, HARD)
         self._firmness = np.ones(count)
         self._unseen = np.zeros(count)
+        self._is_firm = True  # every limb, and seen
         self._time = math.nan
 
     def follow(self, time: float, seen: NDArray[np.bool_]) -> bool:
         """Take in at `time` [s] which limbs are seen (D,); whether a weight has changed."""
         passed = time - self._time
         self._time = time
-        if not passed > 0.0:
+        all_seen = bool(seen.all())
+        if not passed > 0.0 or (all_seen and self._is_firm):
             return False
         passed = min(passed, LONGEST_STEP)
         self._unseen = np.where(seen, 0.0, self._unseen + passed)
@@ -52,6 +54,7 @@ class Grip:
         self._firmness += np.where(seen, passed / TAKE_HOLD, falling)
         np.clip(self._firmness, 0.0, 1.0, out=self._firmness)
         weights = _weights(self._firmness)
+        self._is_firm = all_seen and bool((self._firmness == 1.0).all())
         changed = not np.array_equal(weights, self.weights)
         self.weights = weights
         return changed

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from devices.errors import InputError
 from runtime.character import Character
@@ -18,10 +17,12 @@ from runtime.performer import Pose, Rest
 from runtime.skin import Anchors, Skin
 from solvers.abstraction import abstract
 from solvers.arap_cells import SPOKES
+from solvers.chain_retargets import ChainRetargets
 from solvers.handles import HARD
-from solvers.heading import turn_about, turned
-from solvers.polyline_motion import ChainRetarget
+from solvers.heading import turned
+from solvers.polyline_motion import map_chain
 from solvers.skeleton_pose import SkeletonPose
+from solvers.standing import stand, turned_rotations
 from solvers.tree import Tree
 
 Array = NDArray[np.float64]
@@ -96,7 +97,6 @@ class Puppet:
         self._standing = [np.empty_like(character.vertices) for _ in range(2)]
         self.mapping = Mapping(())
         self.gains = np.ones(0)
-        self._retargets: list[tuple[list[int], ChainRetarget]] = []
         self._source_rest: Rest | None = None
         self.rest()
 
@@ -128,19 +128,18 @@ class Puppet:
                 f"{self.character.name} cannot be driven so: {refusal}; let every polyline lead "
                 f"away from node {self.root} or from the start of the first, and none share a bone"
             ) from refusal
-        self._retargets = [
-            (
-                list(drive.source),
-                ChainRetarget(
-                    rest.positions[list(drive.source)],
-                    self.tree.positions[list(drive.target)],
-                    STRAIGHT_ON,
-                    view,
-                    drive.flip,
-                ),
+        maps = [
+            map_chain(
+                rest.positions[list(drive.source)],
+                self.tree.positions[list(drive.target)],
+                STRAIGHT_ON,
+                view,
+                drive.flip,
             )
             for drive in mapping.drives
         ]
+        self._retargets = ChainRetargets(maps, [drive.source for drive in mapping.drives])
+        self._source_tips = np.array([drive.source[-1] for drive in mapping.drives])
         self.mapping = mapping
         self.gains = np.ones(len(mapping.drives))
         self._source_rest = rest
@@ -151,13 +150,20 @@ class Puppet:
         self._skeleton_pose = SkeletonPose(self.tree, root, chains)
         oriented = self.tree.rerooted(root)
         self._parents, self._order = oriented.parents, oriented.order
-        self._driven = np.array([node for chain in chains for node in chain[1:]], dtype=np.int64)
         self._chains = chains
+        self._starts = np.array([chain[0] for chain in chains], dtype=np.int64)
+        self._tips = np.array([chain[-1] for chain in chains], dtype=np.int64)
+        self._limb_of_node = np.full(len(self.tree), -1, dtype=np.int64)  # whose bone ends here
+        for number, chain in enumerate(chains):
+            self._limb_of_node[list(chain[1:])] = number
         node, pivot = self.binding.node, self.binding.pivot
         # A bone is known by its end that lies away from the root, which may not be the binding's.
         self._bone = np.where(self._parents[pivot] == node, pivot, node)
         self._bone[node == pivot] = -1
-        self._retargets = []
+        # Rows of `Placed.turns`: an anchor without a bone turns with its node.
+        self._turn_of_anchor = np.where(self._bone >= 0, self._bone + len(self.tree), node)
+        self._limb_of_bone = np.where(self._bone >= 0, self._limb_of_node[self._bone], -1)
+        self._retargets = ChainRetargets((), ())
         lengths = [_chain_length(self.tree.positions, chain) for chain in chains]
         height = float(np.ptp(self.character.vertices[:, 1]))
         self._exaggeration = Exaggeration(np.array(lengths), height)
@@ -168,9 +174,7 @@ class Puppet:
 
     def _chain_above(self) -> Indices:
         """For each node the chain that moves it, or that it rides on; -1 for none."""
-        chain_of = np.full(len(self.tree), -1, dtype=np.int64)
-        for number, chain in enumerate(self._chains):
-            chain_of[list(chain[1:])] = number
+        chain_of = self._limb_of_node.copy()
         for node in self._order:
             if chain_of[node] < 0 and self._parents[node] >= 0:
                 chain_of[node] = chain_of[self._parents[node]]
@@ -198,8 +202,7 @@ class Puppet:
             for number in np.flatnonzero(tight).tolist():
                 corners[number], stretch[number] = self._try(poses[number])
         self.skin.reset()
-        for _, retarget in self._retargets:
-            retarget.reset()
+        self._retargets.reset()
         return np.array([corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)])
 
     def _try(self, pose: Pose) -> tuple[Array, Array]:
@@ -252,7 +255,7 @@ class Puppet:
         self._drive((), self.root)
         self._body = Body()
         self._source_rest = None
-        self._pose_nodes([])
+        self._pose_nodes(np.zeros((0, 4)))
         self._turn = self._lift = self._time = 0.0
         self._shift = np.zeros(3)
 
@@ -266,27 +269,16 @@ class Puppet:
         if self._source_rest is None:
             return
         rest = self._source_rest
-        joints = pose.facing(rest.heading)
-        self._pose_nodes(
-            [
-                scaled(retarget.rotations(joints[source]), gain)
-                for (source, retarget), gain in zip(self._retargets, self.gains, strict=True)
-            ]
-        )
+        self._pose_nodes(self._retargets.rotations(pose.facing(rest.heading), self.gains))
         self._turn = pose.heading - rest.heading if self._body.turns else 0.0
         self._lift = self._body.lift * float(pose.hips[1] - rest.height)
         self._time = pose.time
-        self._seen = np.array(
-            [not pose.filled[drive.source[-1]] for drive in self.mapping.drives], dtype=np.bool_
-        )
+        self._seen = ~pose.filled[self._source_tips]
 
-    def _pose_nodes(self, turns: list[Array]) -> None:
-        self._rotations, self._posed = self._skeleton_pose.pose(turns)
-        self._positions = self._posed
-        bones = self._rotations[np.maximum(self._parents, 0)]
-        if len(self._driven):
-            bones[self._driven] = np.concatenate(turns)
-        self._bones = bones
+    def _pose_nodes(self, turns: Array) -> None:
+        """Turn the bones of all chains, one chain after another, by (B, 4) from rest."""
+        self._placed = self._skeleton_pose.place(turns)
+        self._positions = self._placed.positions
 
     def deform(self) -> Motion:
         """Let the surface follow the nodes, and the whole follow the performer's body."""
@@ -310,29 +302,17 @@ class Puppet:
     def _strain(self) -> Strain:
         """How far the character's own motion stretches it."""
         amount = self.skin.elasticity.cartoon
-        starts, ends = [c[0] for c in self._chains], [c[-1] for c in self._chains]
-        tips = self._posed[ends] - self._posed[starts]
+        posed = self._placed.positions
+        tips = posed[self._tips] - posed[self._starts]
         return self._exaggeration.strain(self._time, tips, self._lift, amount)
 
     def _stretched(self, strain: Strain) -> Array:
         """Where the nodes are (K, 3) [m] once limbs and the whole are stretched."""
+        posed = self._placed.positions
         if strain.is_none:
-            return self._posed
-        share = self._share_of_nodes(strain)
-        positions = self._posed.copy()
-        for node in self._order:
-            parent = self._parents[node]
-            if parent >= 0:
-                bone = self._posed[node] - self._posed[parent]
-                positions[node] = positions[parent] + share[node] * bone
-        return positions @ self._whole(strain).T
-
-    def _share_of_nodes(self, strain: Strain) -> Array:
-        """How long the bone that ends at each node is (K + 1,); the last is no node's."""
-        share = np.ones(len(self.tree) + 1)
-        for chain, length in zip(self._chains, strain.limbs, strict=True):
-            share[list(chain[1:])] = length
-        return share
+            return posed
+        shares = strain.of_limbs(self._limb_of_node)
+        return self._skeleton_pose.stretched(posed, shares) @ self._whole(strain).T
 
     def _whole(self, strain: Strain) -> Array:
         thin = strain.body ** (-0.5 * self.skin.elasticity.volume_gain)
@@ -340,27 +320,21 @@ class Puppet:
 
     def _anchors(self, strain: Strain) -> Anchors:
         """Where the bones take the anchors."""
-        bones = np.where(
-            (self._bone >= 0)[:, None],
-            self._bones[self._bone],
-            self._rotations[self.binding.node],
-        )
+        turns = self._placed.turns[self._turn_of_anchor]
         pivots = self._positions[self.binding.pivot]
-        return Anchors(bones, pivots, self._share_of_nodes(strain)[self._bone], self._whole(strain))
+        return Anchors(turns, pivots, strain.of_limbs(self._limb_of_bone), self._whole(strain))
 
     def _with_body(self, deformed: Array) -> Motion:
         vertices = self.skin.cover(deformed)
-        # Nothing may sink into the floor: what pushes against it lifts the whole.
-        lift = max(self._lift, -float(vertices[:, 1].min()))
-        self._shift = np.array([0.0, lift, 0.0])
         self._standing.reverse()
         standing = self._standing[0]
-        turn_about(vertices, self._turn, self.tree.positions[self.root], self._shift, standing)
-        whole = Rotation.from_rotvec([0.0, self._turn, 0.0])
+        about = self.tree.positions[self.root]
+        rise = stand(vertices, self._turn, about, self._lift, standing)
+        self._shift = np.array([0.0, rise, 0.0])
         return Motion(
             vertices=standing,
             node_positions=self._on_stage(self._positions),
-            node_rotations=(whole * Rotation.from_quat(self._rotations)).as_quat(),
+            node_rotations=turned_rotations(self._placed.rotations, self._turn),
         )
 
     def _on_stage(self, points: Array) -> Array:
@@ -403,13 +377,3 @@ def _length(drives: list[Drive], target: Array, source: Array) -> float:
 
 def _chain_length(points: Array, chain: tuple[int, ...]) -> float:
     return float(np.linalg.norm(np.diff(points[list(chain)], axis=0), axis=1).sum())
-
-
-def scaled(rotations: Array, share: float) -> Array:
-    """Quaternions (n, 4) with their angles, up to a whole turn, made smaller by `share`."""
-    if share == 1.0:
-        return rotations
-    sine = np.linalg.norm(rotations[:, :3], axis=1, keepdims=True)
-    half = np.arctan2(sine, rotations[:, 3:])
-    axis = rotations[:, :3] / np.maximum(sine, 1e-300)
-    return np.hstack([np.sin(share * half) * axis, np.cos(share * half)])

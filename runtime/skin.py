@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from runtime.character import Character
 from runtime.characters.proxy import proxy_of
@@ -14,7 +13,7 @@ from solvers.arap_cells import SPOKES
 from solvers.articulation import articulate
 from solvers.binding import bind
 from solvers.edges import unique_edges
-from solvers.handles import HARD, group_targets
+from solvers.handles import HARD, group_targets, stretched_turns
 from solvers.squash_stretch import SquashStretchSolver
 from solvers.tree import Tree
 
@@ -147,12 +146,9 @@ class Skin:
 
     def deform(self, anchors: Anchors, iterations: int) -> Array:
         """Let the deformed surface (C, 3) [m] follow its anchors; the next call overwrites it."""
-        turn = Rotation.from_quat(anchors.turns).as_matrix()
         # Along its bone a ring goes as far out as the bone is longer; around it, it is thinner.
-        along = np.einsum("ai,aj->aij", self._axes, self._axes)
-        thin = anchors.lengths ** (-0.5 * self._elasticity.volume_gain)
-        strain = thin[:, None, None] * np.eye(3) + (anchors.lengths - thin)[:, None, None] * along
-        moved = anchors.whole @ turn @ strain
+        thinning = 0.5 * self._elasticity.volume_gain
+        moved = stretched_turns(anchors.turns, self._axes, anchors.lengths, thinning, anchors.whole)
         targets = group_targets(self._offsets, self._group, moved, anchors.pivots)
         self._solver.solve(targets, iterations, out=self._answer)
         self._solver.iron(self._answer)

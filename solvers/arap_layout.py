@@ -13,6 +13,7 @@ import scipy.sparse as sp
 from numpy.typing import ArrayLike
 from scipy.sparse.csgraph import connected_components
 
+from solvers.compiled import kernel
 from solvers.laplacian import Floats, Ints
 from solvers.nested_dissection import Dissection, dissect
 
@@ -77,11 +78,21 @@ def checked_targets(targets: ArrayLike, count: int, frame: Frame) -> Floats:
     points = np.asarray(targets, dtype=np.float64)
     if points.shape != (count, 3):
         raise ValueError(f"expected targets of shape ({count}, 3), got {points.shape}")
-    far = np.abs(points - frame.centre).max(axis=1)
-    if not (far <= _FARTHEST * frame.size).all():
-        bad = int(np.flatnonzero(~(far <= _FARTHEST * frame.size))[0])
+    points = np.ascontiguousarray(points)
+    bad = _first_beyond(points, frame.centre, _FARTHEST * frame.size)
+    if bad >= 0:
         raise ValueError(f"target {bad} is not finite, or absurdly far away: {points[bad]}")
     return points
+
+
+@kernel
+def _first_beyond(points: Floats, centre: Floats, most: float) -> int:
+    """The first of the points that is not within `most` of the centre on every axis, or -1."""
+    for h in range(len(points)):
+        for axis in range(3):
+            if not abs(points[h, axis] - centre[axis]) <= most:  # as NaN is not
+                return h
+    return -1
 
 
 def lay_out(points: Floats, faces: Ints) -> Layout:

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from solvers.compiled import kernel, parallel_kernel
 from solvers.laplacian import Floats, Ints
+from solvers.quaternion import Quaternion, Vector
 from solvers.rotation_fit import LANES, SCRATCH, fit_rotations
 
 KEPT = 4  # groups that move a vertex
@@ -43,13 +44,18 @@ def fit_motions(source: Floats, target: Floats, group_of: Ints, count: int) -> F
 
     Source: Kabsch 1976; Horn 1987.
     """
-    nothing = np.eye(3).ravel()
+    return _fit_motions(source, target, group_of, count)
+
+
+@kernel
+def _fit_motions(source: Floats, target: Floats, group_of: Ints, count: int) -> Floats:
     together = np.zeros_like(group_of)
     covariance, centre = _covariances(source, target, together, np.zeros((1, 6)))
-    overall = _rotations(covariance, nothing)[0]
-    covariances, centres = _covariances(source, target, group_of, np.repeat(centre, count, axis=0))
-    rotations = _rotations(covariances, overall)
-    return _dual_quaternions(rotations, centres)
+    overall = _rotations(covariance, np.eye(3).ravel())[0]
+    empty = np.empty((count, 6))
+    empty[:] = centre[0]
+    covariances, centres = _covariances(source, target, group_of, empty)
+    return _dual_quaternions(_rotations(covariances, overall), centres)
 
 
 @kernel
@@ -173,16 +179,29 @@ def move_along(
             w, a, b, c = w + m * q0, a + m * q1, b + m * q2, c + m * q3
             dw, da = dw + m * motions[g, 4], da + m * motions[g, 5]
             db, dc = db + m * motions[g, 6], dc + m * motions[g, 7]
-        s = 1.0 / (w * w + a * a + b * b + c * c)
         x0, x1, x2 = x[i, 0], x[i, 1], x[i, 2]
-        # v = q x q* + 2 (q d* 's vector part), both over |q|^2
-        c0, c1, c2 = b * x2 - c * x1 + w * x0, c * x0 - a * x2 + w * x1, a * x1 - b * x0 + w * x2
-        t0 = w * da - a * dw + b * dc - c * db
-        t1 = w * db - b * dw + c * da - a * dc
-        t2 = w * dc - c * dw + a * db - b * da
-        out[i, 0] = x0 + 2.0 * s * (b * c2 - c * c1 + t0)
-        out[i, 1] = x1 + 2.0 * s * (c * c0 - a * c2 + t1)
-        out[i, 2] = x2 + 2.0 * s * (a * c1 - b * c0 + t2)
+        moved = _path((w, a, b, c), (dw, da, db, dc), (x0, x1, x2))
+        out[i, 0], out[i, 1], out[i, 2] = x0 + moved[0], x1 + moved[1], x2 + moved[2]
+
+
+@kernel
+def _path(q: Quaternion, d: Quaternion, x: Vector) -> Vector:
+    """How far a point goes under a dual quaternion q + e d, scalars first, of any length."""
+    w, a, b, c = q
+    dw, da, db, dc = d
+    s = 2.0 / (w * w + a * a + b * b + c * c)
+    # v = q x q* + 2 (q d* 's vector part), both over |q|^2
+    c0 = b * x[2] - c * x[1] + w * x[0]
+    c1 = c * x[0] - a * x[2] + w * x[1]
+    c2 = a * x[1] - b * x[0] + w * x[2]
+    t0 = w * da - a * dw + b * dc - c * db
+    t1 = w * db - b * dw + c * da - a * dc
+    t2 = w * dc - c * dw + a * db - b * da
+    return (
+        s * (b * c2 - c * c1 + t0),
+        s * (c * c0 - a * c2 + t1),
+        s * (a * c1 - b * c0 + t2),
+    )
 
 
 def follow(points: Floats, influences: Influences, motions: Floats, out: Floats) -> None:
@@ -201,8 +220,22 @@ def farthest_motion(motions: Floats, points: Floats, group_of: Ints) -> tuple[fl
 
     Points of nobody, whose `group_of` (H,) is -1, do not count.
     """
-    turn = 2.0 * np.arctan2(np.linalg.norm(motions[:, 1:4], axis=1), np.abs(motions[:, 0]))
-    own = group_of >= 0
-    moved = np.empty((int(own.sum()), 3))
-    follow(points[own], follow_one_group(group_of[own]), motions, moved)
-    return float(turn.max()), float(np.linalg.norm(moved - points[own], axis=1).max(initial=0.0))
+    turn, path = _farthest(motions, points, group_of)
+    return turn, path
+
+
+@kernel
+def _farthest(motions: Floats, points: Floats, group_of: Ints) -> tuple[float, float]:
+    half = squared = 0.0
+    for g in range(len(motions)):
+        m = motions[g]
+        sine = math.sqrt(m[1] * m[1] + m[2] * m[2] + m[3] * m[3])
+        half = max(half, math.atan2(sine, abs(m[0])))
+    for h in range(len(points)):
+        if group_of[h] >= 0:
+            m = motions[group_of[h]]
+            x = (points[h, 0], points[h, 1], points[h, 2])
+            moved = _path((m[0], m[1], m[2], m[3]), (m[4], m[5], m[6], m[7]), x)
+            gone = moved[0] * moved[0] + moved[1] * moved[1] + moved[2] * moved[2]
+            squared = max(squared, gone)
+    return 2.0 * half, math.sqrt(squared)

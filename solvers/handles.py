@@ -11,6 +11,7 @@ from scipy.spatial import KDTree
 from solvers.arap_layout import Layout, check_range, checked_integers
 from solvers.compiled import kernel
 from solvers.laplacian import Floats, Ints
+from solvers.quaternion import matrix, normalized
 
 HARD = np.inf  # the weight of a handle that is met exactly
 
@@ -99,6 +100,49 @@ def nearest_groups(rest: Floats, carried: Ints, handles: Handles, parts: Ints) -
     nearest = np.zeros(int(parts.max()) + 1, dtype=np.int64)
     nearest[part_of[nearest_first][where]] = handles.group_of[handle[nearest_first][where]]
     return nearest[part_of]
+
+
+def stretched_turns(
+    turns: Floats, axes: Floats, lengths: Floats, thinning: float, whole: Floats
+) -> Floats:
+    """Linear maps (G, 3, 3) of groups that are stretched along an axis, turned, and then `whole`.
+
+    Across its axis a group becomes thinner by its length to the power of `thinning`.
+
+    Args:
+        turns: (G, 4) rotations, quaternions (x, y, z, w) of any length.
+        axes: (G, 3) unit vectors at rest, or zero for a group that is scaled all round.
+        lengths: (G,) how long each is along its axis, as a share of its length at rest, positive.
+        thinning: 0.5 keeps the volume.
+        whole: (3, 3) what is done to all of them afterwards.
+    """
+    maps = np.empty((len(turns), 3, 3))
+    _turn_and_stretch(turns, axes, lengths, thinning, whole, maps)
+    return maps
+
+
+@kernel
+def _turn_and_stretch(  # noqa: PLR0917
+    turns: Floats, axes: Floats, lengths: Floats, thinning: float, whole: Floats, out: Floats
+) -> None:
+    stretched = np.empty((3, 3))
+    for g in range(len(turns)):
+        R = matrix(normalized((turns[g, 0], turns[g, 1], turns[g, 2], turns[g, 3])))
+        a = (axes[g, 0], axes[g, 1], axes[g, 2])
+        thin = lengths[g] ** -thinning
+        # R (thin I + (length - thin) a a^T), row by row
+        for i in range(3):
+            r = R[i]
+            along = (lengths[g] - thin) * (r[0] * a[0] + r[1] * a[1] + r[2] * a[2])
+            for j in range(3):
+                stretched[i, j] = thin * r[j] + along * a[j]
+        for i in range(3):
+            for j in range(3):
+                out[g, i, j] = (
+                    whole[i, 0] * stretched[0, j]
+                    + whole[i, 1] * stretched[1, j]
+                    + whole[i, 2] * stretched[2, j]
+                )
 
 
 def group_targets(offsets: Floats, group_of: Ints, turns: Floats, positions: Floats) -> Floats:

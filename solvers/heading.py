@@ -45,21 +45,14 @@ def heading(positions: Array, pairs: NDArray[np.int64], before: float = 0.0) -> 
 def turned(positions: Array, angle: float, about: Array) -> Array:
     """Positions (n, 3) turned by `angle` [rad] about the vertical through `about` (3,)."""
     out = np.empty(positions.shape)
-    turn_about(positions, angle, about, np.zeros(3), out)
+    _turn(np.ascontiguousarray(positions), math.cos(angle), math.sin(angle), about, out)
     return out
 
 
-def turn_about(positions: Array, angle: float, about: Array, shift: Array, out: Array) -> None:
-    """Put positions (n, 3), turned as by `turned` and then shifted by (3,), into `out` (n, 3)."""
-    turn = np.array([math.cos(angle), math.sin(angle)])
-    _turn(np.ascontiguousarray(positions), turn, about, about + shift, out)
-
-
 @kernel
-def _turn(points: Array, turn: Array, about: Array, onto: Array, out: Array) -> None:
-    cosine, sine = turn
+def _turn(points: Array, cosine: float, sine: float, about: Array, out: Array) -> None:
     for i in range(len(points)):
         x, z = points[i, 0] - about[0], points[i, 2] - about[2]
-        out[i, 0] = onto[0] + (cosine * x + sine * z)
-        out[i, 1] = onto[1] + (points[i, 1] - about[1])
-        out[i, 2] = onto[2] + (cosine * z - sine * x)
+        out[i, 0] = about[0] + (cosine * x + sine * z)
+        out[i, 1] = points[i, 1]
+        out[i, 2] = about[2] + (cosine * z - sine * x)

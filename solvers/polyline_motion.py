@@ -23,7 +23,7 @@ smallest rotation from where its predecessor has carried it.
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -126,8 +126,32 @@ def bone_samples(source_rest: Array, target_rest: Array) -> tuple[NDArray[np.int
     return np.column_stack([real[before], real[after]]), np.clip(shares, 0.0, 1.0)
 
 
-class ChainRetarget:
-    """Carries the motion of a source polyline over to a target polyline, frame by frame.
+class ChainMap(NamedTuple):
+    """How the motion of a source polyline is carried over to a target: what no frame changes.
+
+    Attributes:
+        rest: (P - 1, 3) unit directions of the source's bones; zero for a bone without length.
+        axis: (3,) what a bone turns about that has come to point the other way.
+        bones: (Q - 1, 2) as of `bone_samples`.
+        shares: (Q - 1,) likewise.
+        change: (3, 3) rotation from the source's world to the target's.
+    """
+
+    rest: Array
+    axis: Array
+    bones: NDArray[np.int64]
+    shares: Array
+    change: Array
+
+
+def map_chain(
+    source_rest: ArrayLike,
+    target_rest: ArrayLike,
+    source_view: ArrayLike,
+    target_view: ArrayLike,
+    flip: bool = False,
+) -> ChainMap:
+    """How the motion of one polyline is carried over to another.
 
     Args:
         source_rest: (P, 3) source nodes at rest, from the root outward, P >= 2.
@@ -135,6 +159,23 @@ class ChainRetarget:
         source_view: (3, 3) rotation from the source's world to its capture device.
         target_view: (3, 3) rotation from the target's world to its camera.
         flip: turn the target's y-axis over (section 5.2).
+
+    Raises:
+        ValueError: a wrong shape.
+    """
+    source, target = _polyline(source_rest, "source_rest"), _polyline(target_rest, "target_rest")
+    views = _rotation(source_view, "source_view"), _rotation(target_view, "target_view")
+    bones, shares = bone_samples(source, target)
+    directions = mean_direction(source), mean_direction(target)
+    change = basis_change(*directions, *views, flip=flip)
+    return ChainMap(_directions(source), views[0][2].copy(), bones, shares, change)
+
+
+class ChainRetarget:
+    """Carries the motion of a source polyline over to a target polyline, frame by frame.
+
+    Args:
+        source_rest, target_rest, source_view, target_view, flip: as of `map_chain`.
 
     Rotations are measured in the source's world, and given in the target's: a limb on a spine that
     bends already holds the spine's turn.
@@ -151,18 +192,9 @@ class ChainRetarget:
         target_view: ArrayLike,
         flip: bool = False,
     ) -> None:
-        source, target = (
-            _polyline(source_rest, "source_rest"),
-            _polyline(target_rest, "target_rest"),
-        )
-        views = _rotation(source_view, "source_view"), _rotation(target_view, "target_view")
-        self._axis = views[0][2].copy()
-        self._rest = _directions(source)
-        self._bones, self._shares = bone_samples(source, target)
-        directions = mean_direction(source), mean_direction(target)
-        self._change = basis_change(*directions, *views, flip=flip)
-        self._turns = np.zeros((len(source) - 1, 4))  # all zero: no frame has been seen
-        self._last = np.zeros((len(source) - 1, 3))
+        self._map = map_chain(source_rest, target_rest, source_view, target_view, flip)
+        self._turns = np.zeros((len(self._map.rest), 4))  # all zero: no frame has been seen
+        self._last = np.zeros((len(self._map.rest), 3))
 
     def reset(self) -> None:
         """Forget the last frame, as after a cut."""
@@ -174,12 +206,11 @@ class ChainRetarget:
         The pose must be finite.
         """
         pose = np.ascontiguousarray(source_pose, dtype=np.float64)
-        if pose.shape != (len(self._rest) + 1, 3):
-            raise ValueError(
-                f"Expected `source_pose` to have shape ({len(self._rest) + 1}, 3), got {pose.shape}"
-            )
-        _follow(self._rest, pose, self._axis, self._turns, self._last)
-        return _sample(self._turns, self._bones, self._shares, self._change)
+        nodes = len(self._turns) + 1
+        if pose.shape != (nodes, 3):
+            raise ValueError(f"Expected `source_pose` to have shape ({nodes}, 3), got {pose.shape}")
+        follow_bones(self._map.rest, pose, self._map.axis, self._turns, self._last)
+        return self._sampled()
 
     def rotations_of_bones(self, bone_rotations: ArrayLike) -> Array:
         """As `rotations`, from the source bones' own world rotations (P - 1, 4) from rest.
@@ -192,7 +223,12 @@ class ChainRetarget:
                 f"Expected `bone_rotations` to have shape {self._turns.shape}, got {given.shape}"
             )
         _follow_rotations(given, self._turns)
-        return _sample(self._turns, self._bones, self._shares, self._change)
+        return self._sampled()
+
+    def _sampled(self) -> Array:
+        sampled = np.empty((len(self._map.bones), 4))
+        sample_bones(self._turns, self._map.bones, self._map.shares, self._map.change, sampled)
+        return sampled
 
 
 def cumulative_rotations(source_rest: ArrayLike, source_pose: ArrayLike) -> Array:
@@ -239,8 +275,16 @@ def _middles(points: Array) -> Array:
 
 
 @kernel
-def _follow(rest: Array, pose: Array, axis: Array, turns: Array, last: Array) -> None:
-    """Update each bone's turn against its predecessor, and its direction as that one carries it."""
+def follow_bones(rest: Array, pose: Array, axis: Array, turns: Array, last: Array) -> None:
+    """Update each bone's turn against its predecessor, and its direction as that one carries it.
+
+    Args:
+        rest: (P - 1, 3) as of `ChainMap`.
+        pose: (P, 3) where the source's nodes are now.
+        axis: (3,) as of `ChainMap`.
+        turns: (P - 1, 4) as of the last frame, zero before the first; overwritten.
+        last: (P - 1, 3) each bone's direction, carried back; overwritten.
+    """
     carried = (0.0, 0.0, 0.0, 1.0)
     for i in range(len(rest)):
         x = pose[i + 1, 0] - pose[i, 0]
@@ -312,9 +356,10 @@ def _follow_rotations(given: Array, turns: Array) -> None:
 
 
 @kernel
-def _sample(turns: Array, bones: NDArray[np.int64], shares: Array, change: Array) -> Array:
-    """q at each target bone, taken over into the target's world."""
-    sampled = np.empty((len(bones), 4))
+def sample_bones(
+    turns: Array, bones: NDArray[np.int64], shares: Array, change: Array, sampled: Array
+) -> None:
+    """Put q at each target bone, taken over into the target's world, into `sampled` (Q - 1, 4)."""
     carried = (0.0, 0.0, 0.0, 1.0)
     at = -1
     for j in range(len(bones)):
@@ -330,4 +375,3 @@ def _sample(turns: Array, bones: NDArray[np.int64], shares: Array, change: Array
         for k in range(3):
             sampled[j, k] = change[k, 0] * q[0] + change[k, 1] * q[1] + change[k, 2] * q[2]
         sampled[j, 3] = q[3]
-    return sampled

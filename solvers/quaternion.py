@@ -77,3 +77,14 @@ def power(q: Quaternion, t: float) -> Quaternion:
     half = t * math.atan2(sine, q[3])
     scale = math.sin(half) / sine
     return (q[0] * scale, q[1] * scale, q[2] * scale, math.cos(half))
+
+
+@kernel
+def matrix(q: Quaternion) -> tuple[Vector, Vector, Vector]:
+    """The rows of the unit quaternion's rotation matrix."""
+    x, y, z, w = q
+    return (
+        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)),
+        (2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)),
+        (2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)),
+    )

@@ -11,6 +11,7 @@ world as well, and nothing is turned twice.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -22,6 +23,25 @@ from solvers.tree import Tree
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Placed:
+    """Where the K nodes of a tree are, and how they and its bones are turned.
+
+    Attributes:
+        positions: (K, 3).
+        turns: (2 K, 4) world rotations from rest: of each node, then of the bone that ends at each;
+            none ends at the root.
+    """
+
+    positions: Array
+    turns: Array
+
+    @property
+    def rotations(self) -> Array:
+        """World rotations (K, 4) of the nodes from rest."""
+        return self.turns[: len(self.positions)]
 
 
 class SkeletonPose:
@@ -41,6 +61,7 @@ class SkeletonPose:
         self._rest = oriented.positions
         self._order = np.array(oriented.order, dtype=np.int64)
         self._parents = oriented.parents
+        self._links = np.column_stack([self._order, self._parents[self._order]])
         self._driver = np.full(len(tree), -1, dtype=np.int64)  # row of the bone that ends here
         self._next = np.full(len(tree), -1, dtype=np.int64)  # row of the same chain's next bone
         row = 0
@@ -56,7 +77,16 @@ class SkeletonPose:
         self._bones = row
 
     def pose(self, bone_rotations: Sequence[Array]) -> tuple[Array, Array]:
-        """Rotations (K, 4) and positions (K, 3) of all nodes.
+        """Rotations (K, 4) and positions (K, 3) of all nodes, as of `place`.
+
+        Args:
+            bone_rotations: for each chain, world rotations from rest (len(chain) - 1, 4).
+        """
+        placed = self.place(np.concatenate([np.zeros((0, 4)), *bone_rotations]))
+        return placed.rotations, placed.positions
+
+    def place(self, bone_rotations: Array) -> Placed:
+        """Place all nodes as the B bones of the chains are turned.
 
         A point x of the surface that follows node k goes to R_k (x - rest_k) + position_k. Inside a
         chain a node turns with the bone that starts at it, as a rig's joint does, and what hangs
@@ -64,21 +94,28 @@ class SkeletonPose:
         keeps what moves it otherwise. All other nodes ride with their parent.
 
         Args:
-            bone_rotations: for each chain, world rotations from rest (len(chain) - 1, 4).
+            bone_rotations: (B, 4) world rotations from rest, chain after chain.
 
         Raises:
             ValueError: not one rotation for each driven bone.
         """
-        stacked = np.concatenate([np.zeros((0, 4)), *bone_rotations])
-        if stacked.shape != (self._bones, 4):
+        if bone_rotations.shape != (self._bones, 4):
             raise ValueError(
-                f"Expected {self._bones} rotations of driven bones, got shape {stacked.shape}"
+                f"Expected {self._bones} rotations of driven bones, got shape"
+                f" {bone_rotations.shape}"
             )
-        rotations = np.empty((len(self._rest), 4))
-        positions = np.empty((len(self._rest), 3))
-        links = np.column_stack([self._order, self._parents[self._order]])
-        _forward(links, self._rest, self._driver, self._next, stacked, rotations, positions)
-        return rotations, positions
+        given = np.ascontiguousarray(bone_rotations, dtype=np.float64)
+        placed = Placed(np.empty((len(self._rest), 3)), np.empty((2 * len(self._rest), 4)))
+        _forward(
+            self._links, self._rest, self._driver, self._next, given, placed.turns, placed.positions
+        )
+        return placed
+
+    def stretched(self, positions: Array, shares: Array) -> Array:
+        """Where nodes at (K, 3) are when the bone that ends at each is `shares` (K,) as long."""
+        out = np.empty_like(positions)
+        _stretch(self._links, positions, shares, out)
+        return out
 
 
 def pose(
@@ -94,22 +131,24 @@ def _forward(  # noqa: PLR0917
     rest: Array,
     driver: Ints,
     following: Ints,
-    bones: Array,
-    rotations: Array,
+    given: Array,
+    turns: Array,
     positions: Array,
 ) -> None:
-    """Place every node after its parent."""
+    """Place every node after its parent; `turns` as of `Placed`."""
+    rotations, bones = turns[: len(rest)], turns[len(rest) :]
     for step in range(len(links)):
         node, parent = links[step, 0], links[step, 1]
         if parent < 0:
-            rotations[node] = np.array([0.0, 0.0, 0.0, 1.0])
+            rotations[node] = bones[node] = np.array([0.0, 0.0, 0.0, 1.0])
             positions[node] = rest[node]
             continue
         above = rotations[parent]
         bone = (above[0], above[1], above[2], above[3])
         if driver[node] >= 0:
-            own = bones[driver[node]]
+            own = given[driver[node]]
             bone = normalized((own[0], own[1], own[2], own[3]))
+        bones[node, 0], bones[node, 1], bones[node, 2], bones[node, 3] = bone
         offset = rotate(
             bone,
             (
@@ -121,6 +160,18 @@ def _forward(  # noqa: PLR0917
         for k in range(3):
             positions[node, k] = positions[parent, k] + offset[k]
         if following[node] >= 0:
-            own = bones[following[node]]
+            own = given[following[node]]
             bone = normalized((own[0], own[1], own[2], own[3]))
         rotations[node, 0], rotations[node, 1], rotations[node, 2], rotations[node, 3] = bone
+
+
+@kernel
+def _stretch(links: Ints, positions: Array, shares: Array, out: Array) -> None:
+    """Move every node along with its parent, and out along its bone."""
+    for step in range(len(links)):
+        node, parent = links[step, 0], links[step, 1]
+        for k in range(3):
+            out[node, k] = positions[node, k]
+            if parent >= 0:
+                bone = positions[node, k] - positions[parent, k]
+                out[node, k] = out[parent, k] + shares[node] * bone

@@ -11,6 +11,8 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from solvers.compiled import kernel
+
 Array = NDArray[np.float64]
 
 
@@ -34,14 +36,23 @@ class Springs:
         self._damping = damping
 
     def step(self, target: ArrayLike, seconds: float) -> Array:
-        """Where they are (n,) after `seconds` [s] of being pulled to `target` (n,)."""
-        goal = np.asarray(target, dtype=np.float64)
+        """Where they are (n,) after `seconds` [s] of being pulled to `target` (n,).
+
+        The next step overwrites it.
+        """
+        goal = np.ascontiguousarray(target, dtype=np.float64)
         decay = self._damping * self._omega
         turn = self._omega * math.sqrt(1.0 - self._damping**2)
         fade = math.exp(-decay * seconds)
         cosine, sine = fade * math.cos(turn * seconds), fade * math.sin(turn * seconds) / turn
-        away = self.at - goal
-        push = self.speed + decay * away
-        self.speed = cosine * self.speed - sine * (self._omega**2 * away + decay * self.speed)
-        self.at = np.asarray(goal + cosine * away + sine * push)
+        _step(self.at, self.speed, goal, (cosine, sine, decay, self._omega**2))
         return self.at
+
+
+@kernel
+def _step(at: Array, speed: Array, goal: Array, factors: tuple[float, float, float, float]) -> None:
+    cosine, sine, decay, stiffness = factors
+    for i in range(len(at)):
+        away, fast = at[i] - goal[i], speed[i]
+        speed[i] = cosine * fast - sine * (stiffness * away + decay * fast)
+        at[i] = goal[i] + cosine * away + sine * (fast + decay * away)

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from devices.errors import InputError
 from runtime.mapping import Drive, Mapping
 from runtime.performer import Performer, Pose, rest_state
-from runtime.puppet import Body, Motion, Puppet, body_of, scaled
+from runtime.puppet import Body, Motion, Puppet, body_of
 from runtime.skin import Elasticity
 from solvers.edges import unique_edges
 from solvers.heading import turned
@@ -290,17 +290,6 @@ def test_a_rigs_weights_decide_what_a_bone_takes_along() -> None:
     ends = puppet.binding.node[puppet.binding.anchor[held]]
     assert set(ends.tolist()) == {node("elbow.L")} | set(ends[ends == node("wrist.L")].tolist())
     np.testing.assert_allclose(puppet.deform().vertices, FIGURE.vertices, atol=1e-9)
-
-
-@pytest.mark.parametrize("share", [1.0, 0.75, 0.3])
-def test_a_turn_is_scaled_even_beyond_half_a_turn(share: float) -> None:
-    axis = np.array([1.0, -2.0, 2.0]) / 3.0
-    angles = np.radians([0.0, 30.0, 179.0, 181.0, 270.0, 359.0])
-    quaternions = np.column_stack([np.sin(angles / 2)[:, None] * axis, np.cos(angles / 2)])
-    expected = np.column_stack(
-        [np.sin(share * angles / 2)[:, None] * axis, np.cos(share * angles / 2)]
-    )
-    np.testing.assert_allclose(scaled(quaternions, share), expected, atol=1e-12)
 
 
 def test_the_body_goes_along_when_every_leg_drives() -> None:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from solvers.arap import ArapSolver
-from solvers.handles import group_targets
+from solvers.handles import group_targets, stretched_turns
 
 
 def tube(rings: int = 40, around: int = 16) -> tuple[np.ndarray, np.ndarray]:
@@ -191,3 +191,16 @@ def test_groups_with_a_position_and_a_rotation_take_their_handles_along():
     np.testing.assert_allclose(targets[16:], turn[1].apply(offsets[16:]) + positions[1], atol=1e-12)
     answer = ArapSolver(POINTS, FACES, ENDS, groups=GROUPS).solve(targets, 1)
     np.testing.assert_array_equal(answer[ENDS], targets)
+
+
+def test_what_grows_longer_grows_thinner_about_its_axis():
+    turns = Rotation.random(3, random_state=5)
+    axes = np.array([[0.0, 0.6, 0.8], [1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])  # the last has none
+    lengths, whole = np.array([1.0, 1.5, 0.8]), np.diag([0.9, 1.2, 0.9])
+    maps = stretched_turns(3.0 * turns.as_quat(), axes, lengths, 0.5, whole)
+    np.testing.assert_allclose(maps[0], whole @ turns[0].as_matrix(), atol=1e-14)
+    thin = 1.5**-0.5
+    along, across = np.linalg.solve(whole, maps[1])[:, :2].T
+    np.testing.assert_allclose(along, turns[1].apply([1.5, 0.0, 0.0]), atol=1e-14)
+    np.testing.assert_allclose(across, turns[1].apply([0.0, thin, 0.0]), atol=1e-14)
+    np.testing.assert_allclose(maps[2], 0.8**-0.5 * whole @ turns[2].as_matrix(), atol=1e-14)

@@ -120,3 +120,27 @@ def test_chains_that_cannot_be_driven_are_refused(root, chains, message):
 def test_a_missing_rotation_is_refused():
     with pytest.raises(ValueError, match="Expected 2 rotations"):
         pose(spine_with_arms(), 0, [(0, 1, 2)], [np.array([STILL])])
+
+
+def test_each_bone_is_known_with_its_turn():
+    tree = spine_with_arms()
+    placed = SkeletonPose(tree, 0, [(0, 1, 2), (2, 3, 4)]).place(
+        np.array([turn(20), turn(50), turn(-10), turn(70)])
+    )
+    bones = Rotation.from_quat(placed.turns[len(tree) :])
+    for node, parent in enumerate(tree.parents):
+        if parent >= 0:
+            bone = bones[node].apply(tree.positions[node] - tree.positions[parent])
+            moved = placed.positions[node] - placed.positions[parent]
+            np.testing.assert_allclose(moved, bone, atol=1e-12)
+
+
+def test_a_longer_bone_carries_what_hangs_on_it_outward():
+    tree = spine_with_arms()
+    skeleton = SkeletonPose(tree, 0, [])
+    shares = np.ones(8)
+    shares[[1, 4]] = 1.5, 3.0
+    out = skeleton.stretched(tree.positions, shares)
+    moved = np.array([(0, 0, 0)] + 6 * [(0, 0.5, 0)] + [(0, 0, 0)])
+    moved[4] += (2.0, 0.0, 0.0)
+    np.testing.assert_allclose(out, tree.positions + moved, atol=1e-15)
