@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
+from collections.abc import Iterable
 from statistics import median
 
 HALF = 0.5  # of a period without anything ends a frame
@@ -33,19 +35,24 @@ class FrameAssembly:
         self._last_in: dict[int, int] = {}
         self._previous: float | None = None
         self._periods: deque[float] = deque(maxlen=KEPT_PERIODS)
+        self._gap = UNKNOWN_GAP
 
     @property
     def gap(self) -> float:
         """The time [s] between two messages by which they are of different frames."""
-        if len(self._periods) < FEWEST_PERIODS:
-            return UNKNOWN_GAP
-        return min(HALF * median(self._periods), LONGEST_GAP)
+        if math.isnan(self._gap):
+            self._gap = min(HALF * median(self._periods), LONGEST_GAP)
+        return self._gap
 
     def add(self, part: int, arrival: float) -> None:
         """Take in a part that came at `arrival` [s]."""
+        self.add_all((part,), arrival)
+
+    def add_all(self, parts: Iterable[int], arrival: float) -> None:
+        """Take in parts that came at `arrival` [s]."""
         if not self.parts:
             self._began = arrival
-        self.parts.add(part)
+        self.parts.update(parts)
         self.newest = arrival
 
     def overdue(self, now: float) -> bool:
@@ -60,12 +67,14 @@ class FrameAssembly:
     def end(self) -> None:
         """The frame is over; the next part begins another."""
         self._number += 1
-        for part in self.parts:
-            self._last_in[part] = self._number
-        oldest = self._number - REMEMBERED_FRAMES
-        self._last_in = {part: last for part, last in self._last_in.items() if last > oldest}
+        self._last_in.update(dict.fromkeys(self.parts, self._number))
+        if len(self._last_in) > len(self.parts):
+            oldest = self._number - REMEMBERED_FRAMES
+            self._last_in = {part: last for part, last in self._last_in.items() if last > oldest}
         if self._previous is not None:
             self._periods.append(self._began - self._previous)
+            known = len(self._periods) >= FEWEST_PERIODS
+            self._gap = math.nan if known else UNKNOWN_GAP  # found when it is asked for
         self._previous = self._began
         self.parts = set()
 
@@ -77,4 +86,5 @@ class FrameAssembly:
         """Another sender may follow: expect nothing of it."""
         self._last_in.clear()
         self._periods.clear()
+        self._gap = UNKNOWN_GAP
         self._previous = None

@@ -48,14 +48,23 @@ def read_packet(data: bytes) -> list[Message]:
     Raises:
         OscError: anything in the datagram is malformed; then nothing of it is believed.
     """
-    return list(_messages(data, 0, len(data), 0))
+    return [read_message(data, start, end) for start, end in elements(data)]
 
 
-def _messages(data: bytes, start: int, end: int, depth: int) -> Iterator[Message]:
+def elements(data: bytes) -> Iterator[tuple[int, int]]:
+    """Where each message of a datagram begins and ends, in order; bundles opened.
+
+    Raises:
+        OscError: a bundle is malformed; the messages themselves are not looked at.
+    """
+    return _elements(data, 0, len(data), 0)
+
+
+def _elements(data: bytes, start: int, end: int, depth: int) -> Iterator[tuple[int, int]]:
     if (end - start) % 4 or end - start < 8:
         raise OscError(f"an element has {end - start} bytes")
     if not data.startswith(BUNDLE, start, end):
-        yield _message(data, start, end)
+        yield start, end
         return
     if depth == DEEPEST:
         raise OscError(f"bundles lie more than {DEEPEST} deep")
@@ -67,11 +76,16 @@ def _messages(data: bytes, start: int, end: int, depth: int) -> Iterator[Message
         place += 4
         if not 8 <= size <= end - place:
             raise OscError(f"an element claims {size} of {end - place} bytes")
-        yield from _messages(data, place, place + size, depth + 1)
+        yield from _elements(data, place, place + size, depth + 1)
         place += size
 
 
-def _message(data: bytes, start: int, end: int) -> Message:
+def read_message(data: bytes, start: int, end: int) -> Message:
+    """The message that lies between two places of a datagram.
+
+    Raises:
+        OscError: it is malformed.
+    """
     address, place = _text(data, start, end)
     if not address or address[0] in "#,":
         raise OscError("a message has no address")
@@ -98,6 +112,12 @@ def _message(data: bytes, start: int, end: int) -> Message:
     if place != end:
         raise OscError(f"{address[:40]!r} has {end - place} bytes more than its type tags say")
     return Message(address, tags[1:], tuple(arguments))
+
+
+def numbers_at_end(tags: str) -> int:
+    """How many bytes of a message with these type tags are numbers with nothing behind them."""
+    numbers = tags[len(tags.rstrip("".join(_NUMBERS))) :]
+    return struct.calcsize(">" + "".join(_NUMBERS[tag] for tag in numbers))
 
 
 def _steps(tags: str) -> tuple[tuple[str, struct.Struct | None], ...]:

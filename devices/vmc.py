@@ -11,7 +11,8 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from urllib.parse import SplitResult
 
 import numpy as np
@@ -21,24 +22,26 @@ from devices.address import host_and_port, one_of, options_of, positive
 from devices.clock_map import STEP_BACK, ClockMap
 from devices.errors import InputError
 from devices.frame_assembly import FrameAssembly
+from devices.humanoid_kernels import FARTHEST, read_bones
 from devices.humanoid_pose import COUNT, SKELETON, HumanoidPose
 from devices.joint_names import Kind, Side, part_of_name
 from devices.live_stream import LiveStream
-from devices.osc import Message, OscError, read_packet
+from devices.osc import Message, OscError, elements, numbers_at_end, read_message
+from devices.osc_layouts import Layouts
 from devices.skeleton import SkeletonFrame
 from devices.udp import UdpTransport
 from devices.unity_space import across_unity, turn_across_unity
 
 MARIONETTE, PERFORMER = "marionette", "performer"
 PORTS = {MARIONETTE: 39539, PERFORMER: 39540}
-FARTHEST = 1000.0  # [m] or a position is not believed
 MOST_EXPRESSIONS = 512
-UNSURE = 0.5
-"""Confidence of a bone that keeps its last value, and of all while the sender tracks badly."""
+FEWEST_IN_A_RUN = 4  # bones that are worth reading together
 
 _BONES = {name: joint for joint, name in enumerate(SKELETON.names)}
 _BONES_ANY_CASE = {name.lower(): joint for name, joint in _BONES.items()}
+_BONE = "/VMC/Ext/Bone/Pos"
 _POSE = "sfffffff"
+_POSE_BYTES = 28
 _TRACKED = {
     Kind.HEAD: "Head",
     Kind.NECK: "Neck",
@@ -55,6 +58,29 @@ _TRACKED = {
 }
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+Span = tuple[int, int]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """Messages of a packet, one after the other, that each tell a bone's pose, none of them twice.
+
+    Attributes:
+        joints: (n,) of the bones.
+        places: (n,) where in the packet the seven numbers of each begin.
+        parts: the joints as a set.
+        spans: where each message begins and ends.
+    """
+
+    joints: Indices
+    places: Indices
+    parts: frozenset[int]
+    spans: tuple[Span, ...]
+
+
+Plan = tuple[Run | Span, ...]
+"""What a packet holds, in order: runs of bones, and where each other message is."""
 
 
 class VmcDecoder:
@@ -69,6 +95,7 @@ class VmcDecoder:
     Attributes:
         refused: datagrams and messages that were malformed, late or beyond belief.
         expressions: weights of the face's expressions, as committed by the sender.
+        layouts: of the packets with many bones; what differs from them is read message by message.
     """
 
     skeleton = SKELETON
@@ -82,6 +109,7 @@ class VmcDecoder:
     ) -> None:
         self.refused = 0
         self.expressions: Mapping[str, float] = {}
+        self.layouts: Layouts[Plan] = Layouts()
         self._pose = HumanoidPose()
         self._assembly = FrameAssembly()
         self._clock = ClockMap()
@@ -101,7 +129,7 @@ class VmcDecoder:
 
     def _of_role(self, role: str) -> dict[str, Callable[[Message, float], bool]]:
         handlers: dict[str, Callable[[Message, float], bool]] = {
-            "/VMC/Ext/Bone/Pos": self._bone,
+            _BONE: self._bone,
             "/VMC/Ext/T": self._take_time,
             "/VMC/Ext/OK": self._status,
             "/VMC/Ext/Blend/Val": self._blend,
@@ -120,35 +148,71 @@ class VmcDecoder:
     def feed(self, data: bytes, arrival: float) -> Sequence[SkeletonFrame]:
         """The frames that a datagram, which came at `arrival` [s], completes."""
         try:
-            messages = read_packet(data)
+            items = self._read(data)
         except OscError:
             self.refused += 1
             return ()
-        if self._late(messages, arrival):
+        if self._late(items, arrival):
             self.refused += 1
             return ()
         self._frames = []
         self._closing = self._has_parts = False
         if self._assembly.overdue(arrival):
             self._finish()
-        for message in messages:
-            handler = self._handlers.get(message.address)
-            if handler is not None and not handler(message, arrival):
-                self.refused += 1
+        for item in items:
+            if isinstance(item, Message):
+                self._take(item, arrival)
+            else:
+                self._take_run(item, data, arrival)
         if self._has_parts and (self._closing or self._assembly.whole):
             self._finish()
         return self._frames
 
-    def _late(self, messages: Sequence[Message], arrival: float) -> bool:
+    def _read(self, data: bytes) -> Sequence[Message | Run]:
+        """What a packet holds: runs of bones where its layout is known, and messages."""
+        plan = self.layouts.find(data)
+        if plan is not None:
+            return [one if isinstance(one, Run) else read_message(data, *one) for one in plan]
+        spans, messages = [], []
+        for span in elements(data):
+            spans.append(span)
+            messages.append(read_message(data, *span))
+        plan = tuple(_planned(spans, messages))
+        if any(isinstance(one, Run) for one in plan):
+            self.layouts.learn(data, _numbers(spans, messages), plan)
+        return messages
+
+    def _late(self, items: Sequence[Message | Run], arrival: float) -> bool:
         """Whether a datagram was overtaken by a newer one, just now."""
         if not arrival - self._time_came <= STEP_BACK:
             return False  # the sender's clock was set back a little, or stands
-        for message in messages:
-            if message.address == "/VMC/Ext/T" and message.tags[:1] == "f":
-                time = message.arguments[0]
+        for item in items:
+            if not isinstance(item, Message):
+                continue
+            if item.address == "/VMC/Ext/T" and item.tags[:1] == "f":
+                time = item.arguments[0]
                 assert isinstance(time, float)
                 return 0.0 < self._time - time <= STEP_BACK
         return False
+
+    def _take(self, message: Message, arrival: float) -> None:
+        handler = self._handlers.get(message.address)
+        if handler is not None and not handler(message, arrival):
+            self.refused += 1
+
+    def _take_run(self, run: Run, data: bytes, arrival: float) -> None:
+        """Take many bones at once; one by one where one is refused or begins another frame."""
+        bones = self._pose.bones
+        packet = np.frombuffer(data, np.uint8)
+        if self._assembly.parts.isdisjoint(run.parts) and read_bones(
+            packet, run.places, run.joints, bones.positions, bones.rotations
+        ):
+            bones.sent[run.joints] = bones.fresh[run.joints] = True
+            self._assembly.add_all(run.parts, arrival)
+            self._has_parts = True
+            return
+        for span in run.spans:
+            self._take(read_message(data, *span), arrival)
 
     # What each message does; False where it is refused.
 
@@ -156,17 +220,16 @@ class VmcDecoder:
         if not message.tags.startswith(_POSE):
             return False
         name, *numbers = message.arguments[:8]
-        joint = _BONES.get(name)  # type: ignore[arg-type]
-        if joint is None:
-            joint = _BONES_ANY_CASE.get(str(name).lower())
+        joint = _bone_called(str(name))
         if joint is None:
             return True  # LastBone, or one of a later version
         pose = _checked(numbers)  # type: ignore[arg-type]
         if pose is None:
             return False
         self._begin(joint, arrival)
-        self._pose.positions[joint], self._pose.rotations[joint] = pose
-        self._pose.sent[joint] = True
+        bones = self._pose.bones
+        bones.positions[joint], bones.rotations[joint] = pose
+        bones.sent[joint] = True
         return True
 
     def _root(self, message: Message, arrival: float) -> bool:
@@ -177,7 +240,9 @@ class VmcDecoder:
             return False
         if self._rooted and self._assembly.parts:
             self._finish()
-        self._pose.root, self._rooted = pose, True
+        root = self._pose.bones.root
+        root[:3], root[3:] = pose
+        self._rooted = True
         return True
 
     def _tracker(self, message: Message, arrival: float) -> bool:
@@ -190,8 +255,9 @@ class VmcDecoder:
         if joint is None:
             return True  # a tracker that nobody said the place of
         self._begin(COUNT + joint, arrival)
-        self._pose.held[joint] = True
-        self._pose.held_positions[joint], self._pose.held_rotations[joint] = pose
+        bones = self._pose.bones
+        bones.held[joint] = True
+        bones.held_positions[joint], bones.held_rotations[joint] = pose
         return True
 
     def _on_bone(self, address: str, serial: str) -> int | None:
@@ -253,41 +319,43 @@ class VmcDecoder:
         if part in self._assembly.parts:
             self._finish()
         self._assembly.add(part, arrival)
+        self._pose.bones.fresh[part % COUNT] = True
         self._has_parts = True
 
     def _restart(self) -> None:
         """The sender began again, perhaps with another model; only what just came is its."""
+        bones, fresh = self._pose.bones, self._pose.bones.fresh.copy()
         current = [part for part in self._assembly.parts if part < COUNT]
-        kept = self._pose.positions[current], self._pose.rotations[current]
+        kept = bones.positions[current], bones.rotations[current]
         self._pose.forget()
-        self._pose.positions[current], self._pose.rotations[current] = kept
-        self._pose.sent[current] = True
+        bones.positions[current], bones.rotations[current] = kept
+        bones.sent[current] = True
+        bones.fresh[:] = fresh
         self._assembly.restart()
         self._last = None
 
     def _finish(self) -> None:
         """End the frame that was being put together, and give it unless it came before."""
-        assembly, pose = self._assembly, self._pose
-        parts = [part % COUNT for part in assembly.parts]
+        assembly = self._assembly
         arrival = assembly.newest
         self._closing = self._rooted = False
         if self._repeated(arrival):
             assembly.discard()
             self.refused += 1
-            return
-        assembly.end()
-        device = self._time
-        if self._time_used:  # the clock is told less often than bones are
-            device += arrival - self._time_came
-        if not self._valid:
-            return
+        else:
+            assembly.end()
+            device = self._time
+            if self._time_used:  # the clock is told less often than bones are
+                device += arrival - self._time_came
+            if self._valid:
+                self._give(device, arrival)
+        self._pose.bones.fresh[:] = False
+
+    def _give(self, device: float, arrival: float) -> None:
+        """Give the frame that the sender's clock [s] says was at `device`."""
         self._time_used = True
         self._calibrate_when_due(arrival)
-        positions, rotations, confidence = pose.world()
-        kept = np.ones(COUNT, dtype=np.bool_)
-        kept[parts] = False
-        doubtful = kept if self._tracking else np.ones(COUNT, dtype=np.bool_)
-        confidence[doubtful] = np.minimum(confidence[doubtful], UNSURE)
+        positions, rotations, confidence = self._pose.world(tracking=self._tracking)
         self._frames.append(
             SkeletonFrame(
                 time=self._clock.host_time(device, arrival),
@@ -313,6 +381,42 @@ class VmcDecoder:
         if self._tpose is not None and arrival - self._first >= self._tpose:
             self._pose.calibrate()
             self._tpose = None
+
+
+def _bone_called(name: str) -> int | None:
+    joint = _BONES.get(name)
+    return _BONES_ANY_CASE.get(name.lower()) if joint is None else joint
+
+
+def _planned(spans: Sequence[Span], messages: Sequence[Message]) -> Iterator[Run | Span]:
+    """Runs of bones, as long as there are some, and the other messages by themselves."""
+    run: dict[int, Span] = {}
+    for span, message in zip(spans, messages, strict=True):
+        joint = None
+        if message.address == _BONE and message.tags == _POSE:
+            joint = _bone_called(str(message.arguments[0]))
+        if joint is None or joint in run:
+            yield from _as_run(run)
+            run = {}
+        if joint is None:
+            yield span
+        else:
+            run[joint] = span
+    yield from _as_run(run)
+
+
+def _as_run(bones: Mapping[int, Span]) -> Iterator[Run | Span]:
+    if len(bones) < FEWEST_IN_A_RUN:
+        yield from bones.values()
+        return
+    joints = np.array(list(bones), dtype=np.int64)
+    places = np.array([end - _POSE_BYTES for _, end in bones.values()], dtype=np.int64)
+    yield Run(joints, places, frozenset(bones), tuple(bones.values()))
+
+
+def _numbers(spans: Sequence[Span], messages: Sequence[Message]) -> Iterator[slice]:
+    for (_, end), message in zip(spans, messages, strict=True):
+        yield slice(end - numbers_at_end(message.tags), end)
 
 
 def _checked(numbers: Sequence[float]) -> tuple[Array, Array] | None:

@@ -12,11 +12,11 @@ from scipy.spatial.transform import Rotation
 from devices.anatomy import available_presets, source_joints
 from devices.errors import InputError
 from devices.humanoid import FINGERS, SEGMENTS, SIDES, humanoid_skeleton
-from devices.humanoid_pose import INFERRED
+from devices.humanoid_kernels import INFERRED, UNSURE
 from devices.live_stream import LiveStream
 from devices.skeleton import SkeletonFrame
 from devices.stream import open_stream
-from devices.vmc import PERFORMER, UNSURE, VmcDecoder, bone_of_tracker
+from devices.vmc import PERFORMER, VmcDecoder, bone_of_tracker
 from tests.devices.vmc_sender import (
     HUMAN,
     at,

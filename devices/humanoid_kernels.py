@@ -1,0 +1,271 @@
+"""The arithmetic of a humanoid's bones: read from packets, made plausible, laid along the tree."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from devices.compiled import kernel
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Indices = NDArray[np.int64]
+Bytes = NDArray[np.uint8]
+
+FARTHEST = 1000.0  # [m] or a position is not believed
+INFERRED = 0.3
+"""Confidence of a joint that was not sent but is rigid with a bone that was."""
+UNSURE = 0.5
+"""Confidence of a bone that keeps its last value, and of all while the sender tracks badly."""
+NO_LENGTH = 1e-4  # [m] below which an offset was not given
+LONGEST_BONE = 3.0  # [m]
+OUT_OF_PROPORTION = 20.0  # times longer or shorter than the whole body's scale says
+
+
+class Bones(NamedTuple):
+    """What a sender said of its bones, in our own space.
+
+    Attributes:
+        positions: (J, 3) [m] as sent: offsets from the parent bone; of the hips, from the root.
+        rotations: (J, 4) as sent: bone to parent.
+        held_positions, held_rotations: (J, 3) [m] and (J, 4) in the world, of joints that a tracker
+            holds.
+        root: (7,) position [m] and rotation of the model's root in the world.
+        sent: (J,) bool, bones that were ever sent.
+        held: (J,) bool, joints that a tracker holds.
+        fresh: (J,) bool, joints that the newest frame tells of.
+    """
+
+    positions: Array
+    rotations: Array
+    held_positions: Array
+    held_rotations: Array
+    root: Array
+    sent: Mask
+    held: Mask
+    fresh: Mask
+
+
+class Structure(NamedTuple):
+    """How a sender's set of bones hangs together.
+
+    Attributes:
+        parents: (J,) of the joints, -1 for the hips.
+        order: (J,) all joints, the hips first and every parent before its children.
+        absent: (J,) bool, optional bones that the model does not have.
+        defaults: (J, 3) [m] the built-in body's offsets, each from its nearest ancestor that is not
+            absent.
+        lengths: (J,) [m] of those.
+        along: (K, 2) an absent bone, and the next bone of the trunk that is there.
+        shares: (K,) of the way to that one.
+        seen: (J,) bool, joints whose place is known.
+    """
+
+    parents: Indices
+    order: Indices
+    absent: Mask
+    defaults: Array
+    lengths: Array
+    along: Indices
+    shares: Array
+    seen: Mask
+
+
+class Axes(NamedTuple):
+    """The sender's T-pose: (J, 4) rest rotations of the parents, and the inverse of each bone's."""
+
+    upper: Array
+    inverse: Array
+
+
+class WorldPose(NamedTuple):
+    """Positions (J, 3) [m], rotations (J, 4) in the world, NaN where unknown; confidence (J,)."""
+
+    positions: Array
+    rotations: Array
+    confidence: Array
+
+
+@kernel
+def read_bones(
+    data: Bytes, places: Indices, joints: Indices, positions: Array, rotations: Array
+) -> bool:
+    """Take poses from Unity's space at `places` (n,) of a packet: all of them, or none.
+
+    Each is seven big-endian float32: a position (3,) and a quaternion (4,).
+
+    Returns:
+        False where one of them is beyond belief; then nothing was taken.
+    """
+    poses = np.empty((len(places), 7))
+    for row in range(len(places)):
+        for column in range(7):
+            poses[row, column] = _float32(data, places[row] + 4 * column)
+        px, py, pz, x, y, z, w = poses[row]
+        if not abs(px) + abs(py) + abs(pz) < FARTHEST:  # NaN is not
+            return False
+        square = x * x + y * y + z * z + w * w
+        if not 0.25 < square < 4.0:
+            return False
+    for row in range(len(places)):
+        px, py, pz, x, y, z, w = poses[row]
+        length = math.sqrt(x * x + y * y + z * z + w * w)
+        _put3(positions[joints[row]], -px, py, pz)
+        _put4(rotations[joints[row]], x / length, -y / length, -z / length, w / length)
+    return True
+
+
+@kernel
+def _float32(data: Bytes, place: int) -> float:
+    """The big-endian float32 at a place of a packet."""
+    bits = 0
+    for byte in data[place : place + 4]:
+        bits = bits << 8 | int(byte)
+    return float(np.uint32(bits).view(np.float32))
+
+
+@kernel
+def pose_in_world(
+    bones: Bones, structure: Structure, axes: Axes, tracking: bool, out: WorldPose
+) -> None:
+    """Where every joint is, as `WorldPose` says it; less sure where the sender tracks badly."""
+    offsets = np.empty_like(bones.positions)
+    turns = np.empty_like(bones.rotations)
+    _normalise(bones, axes, offsets, turns)
+    _complete(bones, structure, offsets)
+    _place_held(structure.order[0], bones, offsets, turns)
+    for joint in structure.order:
+        above = structure.parents[joint]
+        if above < 0 or bones.held[joint]:
+            out.positions[joint] = offsets[joint]
+            out.rotations[joint] = turns[joint]
+        else:
+            _rotate(out.rotations[above], offsets[joint], out.positions[joint])
+            out.positions[joint] += out.positions[above]
+            _multiply(out.rotations[above], turns[joint], out.rotations[joint])
+    _judge(bones, structure.seen, tracking, out)
+
+
+@kernel
+def _normalise(bones: Bones, axes: Axes, offsets: Array, turns: Array) -> None:
+    """Rotations and offsets as of a model whose bones have the world's axes at rest.
+
+    With R the rest rotation of a bone in the model and P its parent's, a local rotation q becomes
+    P q R^-1 and an offset t becomes P t.
+    """
+    for joint in range(len(turns)):
+        _multiply(bones.rotations[joint], axes.inverse[joint], turns[joint])
+        _multiply(axes.upper[joint], turns[joint], turns[joint])
+        _rotate(axes.upper[joint], bones.positions[joint], offsets[joint])
+
+
+@kernel
+def _complete(bones: Bones, structure: Structure, offsets: Array) -> None:
+    """Offsets (J, 3) [m] of each joint from its parent; as sent where that can be, else default."""
+    hips = structure.order[0]
+    usable = np.empty(len(offsets), dtype=np.bool_)
+    scale = _believe(offsets, structure, bones.sent, usable)
+    told = usable.any() or offsets[hips].any()
+    for joint in range(len(offsets)):
+        if not (usable[joint] or (joint == hips and bones.sent[hips] and told)):
+            offsets[joint] = structure.defaults[joint] * scale
+    for row in range(len(structure.shares)):
+        absent, following = structure.along[row]
+        offsets[absent] = structure.shares[row] * offsets[following]
+    for joint in structure.order[::-1]:  # children first: a parent's is still from its own anchor
+        above = structure.parents[joint]
+        if above >= 0 and structure.absent[above]:
+            offsets[joint] -= offsets[above]
+
+
+@kernel
+def _believe(given: Array, structure: Structure, sent: Mask, usable: Mask) -> float:
+    """Mark the bone offsets (J, 3) [m] that can be believed, never the hips', which is no bone.
+
+    Returns:
+        the sender's size as a multiple of the built-in body's, 1 where nothing tells.
+    """
+    hips = structure.order[0]
+    ratios = np.zeros(len(given))
+    for joint in range(len(given)):
+        x, y, z = given[joint]
+        length = math.sqrt(x * x + y * y + z * z)
+        usable[joint] = joint != hips and sent[joint] and NO_LENGTH < length < LONGEST_BONE
+        if usable[joint]:
+            ratios[joint] = length / structure.lengths[joint]
+    if not usable.any():
+        return 1.0
+    scale = np.median(ratios[usable])
+    for joint in range(len(given)):
+        ratio = ratios[joint]
+        usable[joint] &= scale / OUT_OF_PROPORTION < ratio < scale * OUT_OF_PROPORTION
+    return float(scale)
+
+
+@kernel
+def _place_held(hips: int, bones: Bones, offsets: Array, turns: Array) -> None:
+    """Set the hips on the model's root, and what trackers hold into the world."""
+    root_turn = bones.root[3:]
+    _rotate(root_turn, offsets[hips], offsets[hips])
+    offsets[hips] += bones.root[:3]
+    _multiply(root_turn, turns[hips], turns[hips])
+    for joint in range(len(turns)):
+        if bones.held[joint]:
+            offsets[joint] = bones.held_positions[joint]
+            turns[joint] = bones.held_rotations[joint]
+
+
+@kernel
+def _judge(bones: Bones, seen: Mask, tracking: bool, out: WorldPose) -> None:
+    """Confidences: 1 as sent, INFERRED where rigid with that, UNSURE at most where it is old."""
+    for joint in range(len(seen)):
+        confidence = 1.0
+        if not (bones.sent[joint] or bones.held[joint]):
+            confidence = INFERRED if seen[joint] else 0.0
+        if not (tracking and bones.fresh[joint]):
+            confidence = min(confidence, UNSURE)
+        out.confidence[joint] = confidence
+        if confidence == 0.0:
+            out.positions[joint] = np.nan
+            out.rotations[joint] = np.nan
+
+
+@kernel
+def _rotate(q: Array, v: Array, out: Array) -> None:
+    """A vector (3,) turned by a unit quaternion; `out` may be `v`."""
+    x, y, z, w = q
+    a, b, c = v
+    d, e, f = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
+    _put3(
+        out,
+        a + w * d + (y * f - z * e),
+        b + w * e + (z * d - x * f),
+        c + w * f + (x * e - y * d),
+    )
+
+
+@kernel
+def _multiply(p: Array, q: Array, out: Array) -> None:
+    """The quaternion of the rotation q, then p; `out` may be either."""
+    px, py, pz, pw = p
+    x, y, z, w = q
+    _put4(
+        out,
+        pw * x + w * px + (py * z - pz * y),
+        pw * y + w * py + (pz * x - px * z),
+        pw * z + w * pz + (px * y - py * x),
+        pw * w - (px * x + py * y + pz * z),
+    )
+
+
+@kernel
+def _put3(out: Array, x: float, y: float, z: float) -> None:
+    out[0], out[1], out[2] = x, y, z
+
+
+@kernel
+def _put4(out: Array, x: float, y: float, z: float, w: float) -> None:
+    out[0], out[1], out[2], out[3] = x, y, z, w
