@@ -111,7 +111,7 @@ class Actor:
                 f"Expected `vertices` to have shape {self._rest_shape}, got {vertices.shape}"
             )
         vertices = np.ascontiguousarray(vertices, dtype=np.float64)
-        self._moving.orphan()
+        self._moving.orphan()  # new room: a write must not wait for what still draws from the old
         self._moving.write(self._normals.fill(vertices))
         self._box = bounding_box(vertices)
 

@@ -21,6 +21,8 @@ CREASE = math.radians(62.0)
 # to use vector instructions (as solvers/rotation_fit.py does).
 LANES = 64
 
+_FLAT = 1e-28  # squared sine of an angle below which a face's normal is only what rounding left
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawVertices:
@@ -205,11 +207,12 @@ def _weigh(lanes: NDArray[np.float64], size: int) -> None:
         ux, uy, uz = lanes[k], lanes[LANES + k], lanes[2 * LANES + k]
         vx, vy, vz = lanes[3 * LANES + k], lanes[4 * LANES + k], lanes[5 * LANES + k]
         nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-        double_area = math.sqrt(nx * nx + ny * ny + nz * nz)
+        nn, vv = nx * nx + ny * ny + nz * nz, vx * vx + vy * vy + vz * vz
         uv, uu = ux * vx + uy * vy + uz * vz, ux * ux + uy * uy + uz * uz
+        double_area = math.sqrt(nn)
         at_a, at_b = _angle(uv, double_area), _angle(uu - uv, double_area)
         # Selected and not branched to, so that whole vectors of faces stay in step.
-        flat = double_area == 0.0
+        flat = nn <= _FLAT * uu * vv
         scale = 0.0 if flat else 1.0 / double_area
         at_a, at_b = 0.0 if flat else at_a, 0.0 if flat else at_b
         lanes[k], lanes[LANES + k], lanes[2 * LANES + k] = nx * scale, ny * scale, nz * scale

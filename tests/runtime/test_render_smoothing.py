@@ -95,6 +95,45 @@ def test_a_face_without_area_gives_no_nan() -> None:
     assert np.isfinite(normals).all()
 
 
+def angle_weighted(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
+    """Unit normals (N, 3) by the definition: face normals, weighted by the angle at the vertex."""
+    sums = np.zeros_like(vertices)
+    for face in faces:
+        corners = vertices[face]
+        normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+        for k in range(3):
+            to_next, to_last = corners[k - 2] - corners[k], corners[k - 1] - corners[k]
+            cross = np.linalg.norm(np.cross(to_next, to_last))
+            if cross > 0.0:
+                sums[face[k]] += normal / cross * math.atan2(cross, to_next @ to_last)
+    length = np.linalg.norm(sums, axis=1, keepdims=True)
+    return np.asarray(np.divide(sums, length, out=np.zeros_like(sums), where=length > 0.0))
+
+
+def test_every_normal_is_what_the_definition_says_on_slivers_and_folds_too() -> None:
+    sphere = trimesh.creation.icosphere(subdivisions=3)  # 1280 faces: many blocks, and a part
+    faces = np.asarray(sphere.faces)[:-1]
+    whole = character_of(trimesh.Trimesh(sphere.vertices, faces, process=False))
+    normals = DeformingNormals(split_vertices(whole, crease=math.pi))
+    round_, chance = np.asarray(sphere.vertices), np.random.default_rng(5)
+    rough = round_ + chance.normal(scale=0.08, size=round_.shape)  # edges are 0.14 long: it folds
+    squashed = round_ * (1.0, 1e-4, 1.0) + chance.normal(scale=1e-5, size=round_.shape)
+    torn = rough.copy()
+    torn[faces[100]] = torn[faces[100, 0]]  # no area, in the middle of a block
+    for shape in (rough, squashed, torn, round_):
+        filled = normals.fill(shape)
+        np.testing.assert_array_equal(filled[:, :3], shape.astype(np.float32))
+        # Angles are good to 2e-8; where the surface is folded flat, what is left of a sum is small.
+        np.testing.assert_allclose(filled[:, 3:], angle_weighted(shape, faces), atol=1e-5)
+
+
+def test_where_all_faces_are_without_area_the_normal_is_zero() -> None:
+    sphere = character_of(trimesh.creation.icosphere(subdivisions=1))
+    normals = DeformingNormals(split_vertices(sphere))
+    normals.fill(sphere.vertices)
+    assert not normals.fill(np.ones_like(sphere.vertices))[:, 3:].any()
+
+
 def test_two_runs_agree_to_the_last_bit() -> None:
     torus = character_of(trimesh.creation.torus(1.0, 0.3))
     assert drawn(torus)[1].tobytes() == drawn(torus)[1].tobytes()

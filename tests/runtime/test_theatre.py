@@ -167,6 +167,20 @@ def test_matched_chains_light_up_unless_they_are_hidden(
     np.testing.assert_array_equal(picture(theatre, one, None), dark)
 
 
+def test_what_is_uploaded_needs_no_chains_and_is_drawn_with_them(
+    context: moderngl.Context, puppets: list[Puppet], theatres: list[Theatre]
+) -> None:
+    one = puppets[:1]
+    motions = rested(one)
+    theatres.append(Theatre(context, SIZE, one, BODY))
+    actor = theatres[0]._actors[0]
+    theatres[0].upload(motions)
+    assert len(actor.tubes) == 0, "what the vertices do not need is left for the drawing"
+    theatres[0].draw(None)
+    rods = sum(len(chain) - 1 for chain in one[0].chains)
+    assert len(actor.tubes) == 2 * rods + sum(len(chain) for chain in one[0].chains)
+
+
 def test_the_mirror_shows_the_performer(
     context: moderngl.Context, puppets: list[Puppet], theatres: list[Theatre]
 ) -> None:
