@@ -24,16 +24,19 @@ from numpy.typing import NDArray
 from solvers.compiled import kernel, one_blas_thread, parallel_kernel
 from solvers.laplacian import Floats
 from solvers.nested_dissection import Dissection
-
-Indices = NDArray[np.int32]
-Offsets = NDArray[np.int64]
-Singles = NDArray[np.float32]
+from solvers.panels import (
+    WIDE,
+    Indices,
+    Offsets,
+    Singles,
+    lay_panels,
+    multiply,
+    panels_size,
+)
 
 # Subtrees that are solved at the same time. A fixed number: the answer must not depend on the
 # number of cores.
 TASKS = 4
-WIDTH = 16  # columns of a panel: what the processor multiplies at once, or a multiple
-STEP = 8  # rows of a panel that are added up before their sum is stored
 
 # The share of an error that a solve in single precision may leave.
 _LOST_MOST = 1e-2
@@ -50,16 +53,17 @@ class Entries(NamedTuple):
 class Blocks(NamedTuple):
     """The factor's blocks, children before parents.
 
-    Block b eliminates unknowns firsts[b] to firsts[b + 1], k of them, and touches m later ones,
-    rows[row_starts[b]:row_starts[b + 1]]. With G = L D^-1 (m, k), `ups` holds -G^T (k, m) at
-    up_starts[b]; `downs`, last block first, holds the pivot block's inverse over -G (k + m, k) at
-    down_starts[b + 1]. Both ways are then a row vector times a matrix, read in the order it lies in
-    memory, panel by panel of WIDTH columns; rows are padded with zeros to a multiple of STEP.
+    Block b eliminates unknowns firsts[b] to firsts[b + 1], k of them, and touches m later ones;
+    `reach`, from reach_starts[b] to reach_starts[b + 1], names its own and those, ascending. With
+    G = L D^-1 (m, k), the panels of -G^T (k, m) lie from ups[up_starts[b]] on, and from
+    downs[down_starts[b + 1]] on, last block first, those of the pivot block's inverse over
+    -G (k + m, k). Both ways are then row vectors times a matrix, read in the order it lies in
+    memory: see `solvers.panels`.
     """
 
     firsts: Indices
-    row_starts: Offsets
-    rows: Indices
+    reach_starts: Offsets
+    reach: Indices
     up_starts: Offsets
     ups: Singles
     down_starts: Offsets
@@ -71,35 +75,35 @@ class Schedule(NamedTuple):
 
     Task t is the subtree of blocks task_firsts[t] to task_lasts[t], inclusive; `tops` are the
     blocks above all tasks. A task may not write what it shares with another: it keeps the updates
-    of the `shared` unknowns of the top blocks in a copy of its own, at n + t * len(shared).
+    of the `shared` unknowns of the top blocks in a copy of its own, at n + t * len(shared). No
+    block's matrices have more columns than `widest`, whole panels counted.
     """
 
     task_firsts: Indices
     task_lasts: Indices
     tops: Indices
     shared: Indices
-    tallest: int
+    widest: int
 
 
 class Updates(NamedTuple):
     """What a block passes on to its parent while the matrix is factored.
 
-    `rows` are the blocks' rows without private copies. The update of block b, where it is a task's
-    last block or a top block, is kept in kept[starts[b]:starts[b + 1]], so that other values in one
-    task do not concern the others.
+    `reach` is that of the blocks, without private copies. The update of block b, where it is a
+    task's last block or a top block, is kept in kept[starts[b]:starts[b + 1]], so that other values
+    in one task do not concern the others.
     """
 
     parents: Indices
-    rows: Indices
+    reach: Indices
     starts: Offsets
     kept: Floats
 
 
 class Work(NamedTuple):
-    """Room for a solve: vectors (n + copies, 3); a column of a block and sums, one a task."""
+    """Room for a solve: vectors (n + copies, 3), and each task's sums (tasks + 1, 3, widest)."""
 
     vectors: Singles
-    columns: Singles
     sums: Singles
 
 
@@ -136,7 +140,7 @@ class BlockFactor:
     @property
     def nbytes(self) -> int:
         """The bytes that a solve reads of the factor."""
-        return self._blocks.ups.nbytes + self._blocks.downs.nbytes + 2 * self._blocks.rows.nbytes
+        return self._blocks.ups.nbytes + self._blocks.downs.nbytes + 2 * self._blocks.reach.nbytes
 
     def _fill(self, precision: type[np.floating[Any]]) -> None:
         plan, schedule = self._plan, self._schedule
@@ -146,8 +150,7 @@ class BlockFactor:
         tasks = len(schedule.task_firsts)
         self._work = Work(
             np.zeros((self._matrix.shape[0] + tasks * len(schedule.shared), 3), precision),
-            np.zeros((tasks + 1, schedule.tallest, 3), precision),
-            np.zeros((tasks + 1, 4 * WIDTH), precision),
+            np.zeros((tasks + 1, 3, schedule.widest), precision),
         )
         every = np.ones(tasks, np.bool_)
         with one_blas_thread():
@@ -164,22 +167,22 @@ class BlockFactor:
 
 def _plan(entries: Entries, tree: Dissection) -> tuple[Blocks, Schedule, Updates]:
     """All that does not depend on the matrix's values; the blocks are empty."""
-    row_starts, rows = _symbolic(entries.starts, entries.columns, tree)
-    k, m = np.diff(tree.firsts).astype(np.int64), np.diff(row_starts)
-    up_starts = np.append(0, np.cumsum(_padded(k, STEP) * _padded(m, WIDTH)))
+    reach_starts, reach = _symbolic(entries.starts, entries.columns, tree)
+    k, size = np.diff(tree.firsts).astype(np.int64), np.diff(reach_starts)
+    m = size - k
+    up_starts = np.append(0, np.cumsum(panels_size(k, m)))
     # The way down reads the blocks backwards: let it read memory forwards all the same.
-    down_sizes = _padded(k + m, STEP) * _padded(k, WIDTH)
-    down_starts = np.append(0, np.cumsum(down_sizes[::-1]))[::-1].copy()
-    schedule = _schedule(tree, k * (k + m), int((k + m).max(initial=0)) + STEP)
+    down_starts = np.append(0, np.cumsum(panels_size(size, k)[::-1]))[::-1].copy()
+    schedule = _schedule(tree, k * size, int(np.maximum(k, m).max(initial=0)) + WIDE)
     empty = np.zeros(0, np.float32)
-    blocks = Blocks(tree.firsts, row_starts, rows, up_starts, empty, down_starts, empty)
+    blocks = Blocks(tree.firsts, reach_starts, reach, up_starts, empty, down_starts, empty)
     keepers = np.concatenate([schedule.task_lasts, schedule.tops])
     sizes = np.zeros(len(k), np.int64)
     sizes[keepers] = m[keepers] ** 2
     starts = np.append(0, np.cumsum(sizes))
-    updates = Updates(tree.parents, rows, starts, np.zeros(starts[-1]))
+    updates = Updates(tree.parents, reach, starts, np.zeros(starts[-1]))
     return (
-        blocks._replace(rows=_private_rows(blocks, schedule, len(tree.order))),
+        blocks._replace(reach=_private_reach(blocks, schedule, len(tree.order))),
         schedule,
         updates,
     )
@@ -214,11 +217,7 @@ def _lost_share(matrix: sp.csr_matrix, factor: BlockFactor, rounds: int) -> floa
     return worst
 
 
-def _padded(size: Offsets, multiple: int) -> Offsets:
-    return -(-size // multiple) * multiple
-
-
-def _schedule(tree: Dissection, costs: Offsets, tallest: int) -> Schedule:
+def _schedule(tree: Dissection, costs: Offsets, widest: int) -> Schedule:
     """Split the tree at its top until there are TASKS subtrees, always the costliest next."""
     blocks = len(tree.parents)
     sizes, totals = np.ones(blocks, np.int64), costs.copy()
@@ -246,21 +245,21 @@ def _schedule(tree: Dissection, costs: Offsets, tallest: int) -> Schedule:
         lasts,
         np.array(tops, np.int32),
         np.concatenate([*shared, np.zeros(0)]).astype(np.int32),
-        tallest,
+        widest,
     )
 
 
-def _private_rows(blocks: Blocks, schedule: Schedule, count: int) -> Indices:
-    """The blocks' rows, with shared unknowns replaced by each task's copies of them."""
-    rows = blocks.rows.copy()
+def _private_reach(blocks: Blocks, schedule: Schedule, count: int) -> Indices:
+    """The blocks' reach, with shared unknowns replaced by each task's copies of them."""
+    reach = blocks.reach.copy()
     place = np.full(count, -1, np.int64)
     place[schedule.shared] = np.arange(len(schedule.shared))
     for task, (first, last) in enumerate(zip(*schedule[:2], strict=True)):
-        own = slice(blocks.row_starts[first], blocks.row_starts[last + 1])
-        at = place[rows[own]]
+        own = slice(blocks.reach_starts[first], blocks.reach_starts[last + 1])
+        at = place[reach[own]]
         copies = count + task * len(schedule.shared) + at
-        rows[own] = np.where(at >= 0, copies, rows[own])
-    return rows
+        reach[own] = np.where(at >= 0, copies, reach[own])
+    return reach
 
 
 @parallel_kernel
@@ -283,7 +282,7 @@ def _climb(blocks: Blocks, schedule: Schedule, task: int, b: Floats, work: Work)
     copies = len(b) + task * len(schedule.shared)
     y[copies : copies + len(schedule.shared)] = 0.0
     for block in range(first, last + 1):
-        _send_up(blocks, block, y, work.columns[task], work.sums[task])
+        _send_up(blocks, block, y, work.sums[task])
 
 
 @kernel
@@ -298,9 +297,9 @@ def _turn(blocks: Blocks, schedule: Schedule, b: Floats, x: Floats, work: Work) 
             for t in range(tasks):
                 y[v, d] += y[len(b) + t * len(shared) + h, d]
     for block in schedule.tops:
-        _send_up(blocks, block, y, work.columns[tasks], work.sums[tasks])
+        _send_up(blocks, block, y, work.sums[tasks])
     for block in schedule.tops[::-1]:
-        _send_down(blocks, block, y, work.columns[tasks], work.sums[tasks])
+        _send_down(blocks, block, y, work.sums[tasks])
     for h in range(len(shared)):
         v = shared[h]
         for d in range(3):
@@ -315,129 +314,80 @@ def _descend(blocks: Blocks, schedule: Schedule, task: int, x: Floats, work: Wor
     first, last = schedule.task_firsts[task], schedule.task_lasts[task]
     y = work.vectors
     for block in range(last, first - 1, -1):
-        _send_down(blocks, block, y, work.columns[task], work.sums[task])
+        _send_down(blocks, block, y, work.sums[task])
     for v in range(blocks.firsts[first], blocks.firsts[last + 1]):
         for d in range(3):
             x[v, d] += y[v, d]
 
 
 @kernel
-def _send_up(blocks: Blocks, block: int, y: Singles, column: Singles, sums: Singles) -> None:
+def _send_up(blocks: Blocks, block: int, y: Singles, sums: Singles) -> None:
     """Forward substitution of one block: take G b from the later unknowns that it touches."""
-    first = blocks.firsts[block]
-    k = blocks.firsts[block + 1] - first
-    rows = blocks.rows[blocks.row_starts[block] : blocks.row_starts[block + 1]]
-    height = (k + STEP - 1) // STEP * STEP
-    column[:k] = y[first : first + k]
-    column[k:height] = 0.0
+    begin, end = blocks.reach_starts[block], blocks.reach_starts[block + 1]
+    later = begin + blocks.firsts[block + 1] - blocks.firsts[block]
     at = blocks.up_starts[block]
-    for low in range(0, len(rows), WIDTH):
-        _multiply(column, blocks.ups[at : at + height * WIDTH], sums)
-        at += height * WIDTH
-        for h in range(min(WIDTH, len(rows) - low)):
-            v = rows[low + h]
-            y[v, 0] += sums[h]
-            y[v, 1] += sums[WIDTH + h]
-            y[v, 2] += sums[2 * WIDTH + h]
+    multiply(blocks.ups, at, end - later, y, blocks.reach, begin, later, sums)
+    for h in range(end - later):
+        v = blocks.reach[later + h]
+        y[v, 0] += sums[0, h]
+        y[v, 1] += sums[1, h]
+        y[v, 2] += sums[2, h]
 
 
 @kernel
-def _send_down(blocks: Blocks, block: int, y: Singles, column: Singles, sums: Singles) -> None:
+def _send_down(blocks: Blocks, block: int, y: Singles, sums: Singles) -> None:
     """Backward substitution of one block: its pivot's inverse times b, less G^T times the later."""
+    begin, end = blocks.reach_starts[block], blocks.reach_starts[block + 1]
     first = blocks.firsts[block]
     k = blocks.firsts[block + 1] - first
-    rows = blocks.rows[blocks.row_starts[block] : blocks.row_starts[block + 1]]
-    size = k + len(rows)
-    height = (size + STEP - 1) // STEP * STEP
-    column[:k] = y[first : first + k]
-    for h in range(len(rows)):
-        v = rows[h]
-        column[k + h, 0], column[k + h, 1], column[k + h, 2] = y[v, 0], y[v, 1], y[v, 2]
-    column[size:height] = 0.0
-    at = blocks.down_starts[block + 1]
-    for low in range(0, k, WIDTH):
-        _multiply(column, blocks.downs[at : at + height * WIDTH], sums)
-        at += height * WIDTH
-        for h in range(min(WIDTH, k - low)):
-            v = first + low + h
-            y[v, 0], y[v, 1], y[v, 2] = sums[h], sums[WIDTH + h], sums[2 * WIDTH + h]
-
-
-@kernel
-def _multiply(vectors: Singles, panel: Singles, sums: Singles) -> None:
-    """Three vectors (n, 3) times a panel (n, WIDTH) into sums (3 WIDTH,).
-
-    The inner loop has a constant length and fetches each sum once for STEP rows, so that it
-    compiles to little but fused multiply-adds.
-    """
-    for h in range(3 * WIDTH):
-        sums[h] = 0.0
-    for step in range(len(panel) // (STEP * WIDTH)):
-        w = panel[step * STEP * WIDTH : (step + 1) * STEP * WIDTH]
-        v = vectors[step * STEP : (step + 1) * STEP]
-        a0, a1, a2, a3 = v[0, 0], v[1, 0], v[2, 0], v[3, 0]
-        a4, a5, a6, a7 = v[4, 0], v[5, 0], v[6, 0], v[7, 0]
-        b0, b1, b2, b3 = v[0, 1], v[1, 1], v[2, 1], v[3, 1]
-        b4, b5, b6, b7 = v[4, 1], v[5, 1], v[6, 1], v[7, 1]
-        c0, c1, c2, c3 = v[0, 2], v[1, 2], v[2, 2], v[3, 2]
-        c4, c5, c6, c7 = v[4, 2], v[5, 2], v[6, 2], v[7, 2]
-        for h in range(WIDTH):
-            w0, w1, w2, w3 = w[h], w[WIDTH + h], w[2 * WIDTH + h], w[3 * WIDTH + h]
-            w4, w5 = w[4 * WIDTH + h], w[5 * WIDTH + h]
-            w6, w7 = w[6 * WIDTH + h], w[7 * WIDTH + h]
-            sums[h] += (w0 * a0 + w1 * a1 + w2 * a2 + w3 * a3) + (
-                w4 * a4 + w5 * a5 + w6 * a6 + w7 * a7
-            )
-            sums[WIDTH + h] += (w0 * b0 + w1 * b1 + w2 * b2 + w3 * b3) + (
-                w4 * b4 + w5 * b5 + w6 * b6 + w7 * b7
-            )
-            sums[2 * WIDTH + h] += (w0 * c0 + w1 * c1 + w2 * c2 + w3 * c3) + (
-                w4 * c4 + w5 * c5 + w6 * c6 + w7 * c7
-            )
+    multiply(blocks.downs, blocks.down_starts[block + 1], k, y, blocks.reach, begin, end, sums)
+    for h in range(k):
+        y[first + h, 0], y[first + h, 1], y[first + h, 2] = sums[0, h], sums[1, h], sums[2, h]
 
 
 @kernel
 def _symbolic(starts: Indices, columns: Indices, tree: Dissection) -> tuple[Offsets, Indices]:
-    """The later unknowns that each block touches, ascending."""
+    """Each block's own unknowns and the later ones that it touches, ascending."""
     firsts, parents = tree.firsts, tree.parents
     blocks = len(parents)
     seen = np.full(len(tree.order), -1, np.int32)
-    row_starts = np.zeros(blocks + 1, np.int64)
-    rows = np.empty(4 * len(tree.order) + 64, np.int32)
+    reach_starts = np.zeros(blocks + 1, np.int64)
+    reach = np.empty(4 * len(tree.order) + 64, np.int32)
     filled = 0
     child = np.full(blocks, -1, np.int32)  # the last child of each block, and its elder siblings
     elder = np.full(blocks, -1, np.int32)
     for b in range(blocks):
         begin, last = filled, firsts[b + 1]
         for v in range(firsts[b], last):
+            reach, filled = _append(reach, filled, v)
             for h in range(starts[v], starts[v + 1]):
                 u = columns[h]
                 if u >= last and seen[u] != b:
                     seen[u] = b
-                    rows, filled = _append(rows, filled, u)
+                    reach, filled = _append(reach, filled, u)
         c = child[b]
         while c >= 0:
-            for h in range(row_starts[c], row_starts[c + 1]):
-                u = rows[h]
+            for h in range(reach_starts[c], reach_starts[c + 1]):
+                u = reach[h]
                 if u >= last and seen[u] != b:
                     seen[u] = b
-                    rows, filled = _append(rows, filled, u)
+                    reach, filled = _append(reach, filled, u)
             c = elder[c]
-        rows[begin:filled].sort()
-        row_starts[b + 1] = filled
+        reach[begin:filled].sort()
+        reach_starts[b + 1] = filled
         if parents[b] >= 0:
             elder[b], child[parents[b]] = child[parents[b]], b
-    return row_starts, rows[:filled].copy()
+    return reach_starts, reach[:filled].copy()
 
 
 @kernel
-def _append(rows: Indices, filled: int, value: int) -> tuple[Indices, int]:
-    if filled == len(rows):
-        longer = np.empty(2 * len(rows), np.int32)
-        longer[:filled] = rows
-        rows = longer
-    rows[filled] = value
-    return rows, filled + 1
+def _append(reach: Indices, filled: int, value: int) -> tuple[Indices, int]:
+    if filled == len(reach):
+        longer = np.empty(2 * len(reach), np.int32)
+        longer[:filled] = reach
+        reach = longer
+    reach[filled] = value
+    return reach, filled + 1
 
 
 @kernel
@@ -521,14 +471,16 @@ def _factorise_tops(entries: Entries, blocks: Blocks, schedule: Schedule, update
 @kernel
 def _touched(blocks: Blocks, updates: Updates, block: int) -> Indices:
     """The later unknowns that a block touches."""
-    rows: Indices = updates.rows[blocks.row_starts[block] : blocks.row_starts[block + 1]]
-    return rows
+    k = blocks.firsts[block + 1] - blocks.firsts[block]
+    begin, end = blocks.reach_starts[block] + k, blocks.reach_starts[block + 1]
+    touched: Indices = updates.reach[begin:end]
+    return touched
 
 
 @kernel
 def _kept(blocks: Blocks, updates: Updates, block: int) -> Floats:
     """Where the update of a block is kept, (m, m)."""
-    size = blocks.row_starts[block + 1] - blocks.row_starts[block]
+    size = len(_touched(blocks, updates, block))
     kept = updates.kept[updates.starts[block] : updates.starts[block + 1]]
     update: Floats = kept.reshape((size, size))
     return update
@@ -540,13 +492,10 @@ def _front(
 ) -> Floats:
     """The matrix's own entries of one block; `place` gets to know where its unknowns are."""
     first, last = blocks.firsts[block], blocks.firsts[block + 1]
-    touched = _touched(blocks, updates, block)
-    k = last - first
-    for v in range(first, last):
-        place[v] = v - first
-    for h in range(len(touched)):
-        place[touched[h]] = k + h
-    front = np.zeros((k + len(touched), k + len(touched)))
+    reach = updates.reach[blocks.reach_starts[block] : blocks.reach_starts[block + 1]]
+    for h in range(len(reach)):
+        place[reach[h]] = h
+    front = np.zeros((len(reach), len(reach)))
     for v in range(first, last):
         for h in range(entries.starts[v], entries.starts[v + 1]):
             u = entries.columns[h]
@@ -572,21 +521,10 @@ def _eliminate(front: Floats, block: int, blocks: Blocks) -> Floats:
     inverse = np.linalg.inv(front[:k, :k].copy())
     below = front[k:, :k].copy()
     G = np.dot(below, inverse)
-    _lay_panels(-G.T, blocks.ups[blocks.up_starts[block] : blocks.up_starts[block + 1]])
+    lay_panels(-G.T, blocks.ups[blocks.up_starts[block] : blocks.up_starts[block + 1]])
     down = np.empty((size, k))
     down[:k] = inverse
     down[k:] = -G
-    _lay_panels(down, blocks.downs[blocks.down_starts[block + 1] : blocks.down_starts[block]])
+    lay_panels(down, blocks.downs[blocks.down_starts[block + 1] : blocks.down_starts[block]])
     rest: Floats = front[k:, k:] - np.dot(G, below.T.copy())
     return rest
-
-
-@kernel
-def _lay_panels(matrix: Floats, panels: Singles) -> None:
-    """Copy a matrix into zeroed panels, WIDTH columns after WIDTH columns."""
-    rows, columns = matrix.shape
-    height = (rows + STEP - 1) // STEP * STEP
-    for column in range(columns):
-        at = column // WIDTH * height * WIDTH + column % WIDTH
-        for row in range(rows):
-            panels[at + row * WIDTH] = matrix[row, column]
