@@ -173,9 +173,8 @@ def move_along(
         for k in range(KEPT):
             g = groups[i, k]
             q0, q1, q2, q3 = motions[g, 0], motions[g, 1], motions[g, 2], motions[g, 3]
-            m = weights[i, k]
-            if q0 * p0 + q1 * p1 + q2 * p2 + q3 * p3 < 0.0:
-                m = -m
+            # Of a rotation's two quaternions, the one on the first one's side.
+            m = math.copysign(weights[i, k], q0 * p0 + q1 * p1 + q2 * p2 + q3 * p3)
             w, a, b, c = w + m * q0, a + m * q1, b + m * q2, c + m * q3
             dw, da = dw + m * motions[g, 4], da + m * motions[g, 5]
             db, dc = db + m * motions[g, 6], dc + m * motions[g, 7]
