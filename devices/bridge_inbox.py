@@ -6,7 +6,7 @@ import threading
 from collections.abc import Iterable
 from typing import Protocol
 
-from devices.inbox import Inbox
+from devices.inbox import Bell, Inbox
 from devices.skeleton import SkeletonFrame
 
 PERFORMERS = 256
@@ -47,7 +47,7 @@ class NewestOfEach:
         self.dropped = 0
         self._frames: dict[int, SkeletonFrame] = {}
         self._lock = threading.Lock()
-        self._filled = threading.Event()
+        self._filled = Bell()
 
     def put(self, frames: Iterable[SkeletonFrame]) -> None:
         """Add frames, the newest last."""
@@ -59,18 +59,18 @@ class NewestOfEach:
                     self.dropped += 1
                 self._frames[frame.performer] = frame
             if self._frames:
-                self._filled.set()
+                self._filled.ring()
 
     def wait(self, seconds: float) -> bool:
         """Sleep until a frame is there, at most so long; whether one is."""
-        return self._filled.wait(seconds)
+        return bool(self._frames) or self._filled.wait(seconds)
 
     def take(self) -> list[SkeletonFrame]:
         """One frame of each performer that has moved, oldest first."""
         with self._lock:
             frames = list(self._frames.values())
             self._frames.clear()
-            self._filled.clear()
+            self._filled.still()
         return frames
 
 

@@ -21,6 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from devices.bridge_numbers import make_safe
 from devices.errors import InputError
 from devices.skeleton import Skeleton, SkeletonFrame
 
@@ -39,7 +40,6 @@ _SESSION = struct.Struct("<Q")
 _SAMPLE = struct.Struct("<QQdIHB")
 _ROTATIONS = 1
 _FARTHEST_REST = 1000.0  # [m]
-_UNIT = 1e-6  # how far from 1 the length of a unit quaternion may be
 _BAD = (ValueError, TypeError, KeyError, OverflowError, RecursionError, InputError)
 
 
@@ -93,11 +93,26 @@ class Announcement:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sample:
-    """Bridge to stage: one frame; its time [s] is on the bridge's clock, its arrival not said."""
+    """Bridge to stage: one frame, as `SkeletonFrame` has it, but on the bridge's clock [s]."""
 
     session: int
     sequence: int
-    frame: SkeletonFrame
+    time: float
+    performer: int
+    positions: NDArray[np.float64]
+    rotations: NDArray[np.float64] | None
+    confidence: NDArray[np.float64]
+
+    def frame(self, time: float, arrival: float) -> SkeletonFrame:
+        """The frame, at a time and with an arrival on the stage's clock [s]."""
+        return SkeletonFrame(
+            time=time,
+            positions=self.positions,
+            rotations=self.rotations,
+            confidence=self.confidence,
+            performer=self.performer,
+            arrival=arrival,
+        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -219,28 +234,12 @@ def _decode_sample(body: bytes) -> Sample | None:
     if not (sized and content in (0, _ROTATIONS) and math.isfinite(time)):
         return None
     numbers = np.frombuffer(body, "<f8", offset=_SAMPLE.size).astype(np.float64)
-    positions, confidence, turns = np.split(numbers, [3 * joints, 4 * joints])
-    positions = positions.reshape(joints, 3)
-    seen = np.logical_and.reduce(np.isfinite(positions), axis=1)
-    confidence = np.clip(np.nan_to_num(confidence, nan=0.0), 0.0, 1.0)
-    frame = SkeletonFrame(
-        time=time,
-        positions=np.where(seen[:, None], positions, np.nan),
-        rotations=_unit(turns.reshape(joints, 4)) if content == _ROTATIONS else None,
-        confidence=np.where(seen, confidence, 0.0),
-        performer=performer,
-    )
-    return Sample(session, sequence, frame)
-
-
-def _unit(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Unit quaternions as they are, to the last bit; others made so, NaN where that cannot be."""
-    known = np.logical_and.reduce(np.abs(quaternions) <= 1e6, axis=1)
-    safe = np.where(known[:, None], quaternions, 0.0)
-    lengths = np.linalg.norm(safe, axis=1)
-    turned = np.where((np.abs(lengths - 1.0) <= _UNIT)[:, None], 1.0, lengths[:, None])
-    turned[lengths < _UNIT] = np.nan
-    return safe / turned
+    positions = numbers[: 3 * joints].reshape(joints, 3)
+    confidence = numbers[3 * joints : 4 * joints]
+    rotations = numbers[4 * joints :].reshape(-1, 4)
+    make_safe(positions, confidence, rotations)
+    turned = rotations if content == _ROTATIONS else None
+    return Sample(session, sequence, time, performer, positions, turned, confidence)
 
 
 _DECODERS: dict[int, Callable[[bytes], Message | None]] = {

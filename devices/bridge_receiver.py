@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import secrets
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -28,6 +27,7 @@ from devices.bridge_messages import (
     decode,
     encode_call,
 )
+from devices.bridge_numbers import make_safe
 from devices.skeleton import Skeleton, SkeletonFrame
 
 BEAT = 0.25  # [s] between calls when there is nothing else to say
@@ -72,6 +72,7 @@ class BridgeReceiver:
         self._told = 0  # the highest that the bridge was last told it may send
         self._called_at = float("-inf")
         self._last: dict[int, float] = {}  # each performer's newest time [s]
+        make_safe(np.zeros((1, 3)), np.zeros(1), np.zeros((1, 4)))  # compiled before a frame comes
 
     def feed(self, data: bytes, arrival: float) -> Sequence[SkeletonFrame]:
         """The frame in one message, on our clock; nothing for any other message. Never raises.
@@ -154,12 +155,11 @@ class BridgeReceiver:
             return []
         self.lost += sample.sequence - self._came - 1
         self._came = sample.sequence
-        time = min(sample.frame.time - self.clock.seconds, arrival)
-        time = self._rising(sample.frame.performer, time)
-        return [replace(sample.frame, time=time, arrival=arrival)]
+        time = min(sample.time - self.clock.seconds, arrival)
+        return [sample.frame(self._rising(sample.performer, time), arrival)]
 
     def _fits(self, sample: Sample) -> bool:
-        return self.skeleton is not None and len(sample.frame.positions) == len(self.skeleton.names)
+        return self.skeleton is not None and len(sample.positions) == len(self.skeleton.names)
 
     def _rising(self, performer: int, time: float) -> float:
         """The time, but for what a better knowledge of the other clock takes back."""
