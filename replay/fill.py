@@ -7,9 +7,12 @@ along with the shoulders.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, TypeVar, cast
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from devices.skeleton import Skeleton, SkeletonFrame
@@ -20,6 +23,32 @@ MOST_PERFORMERS = 64  # that are remembered; a sensor may number people anew for
 FARTHEST = 100.0  # [m] from the origin; what claims to lie further was not seen
 
 Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Indices = NDArray[np.int64]
+Records = NDArray[np.void]
+Record = Any  # one of them; compiled code writes through it
+
+# Of each joint: its parent, itself for the root. Where it stands from there at rest; where it stood
+# when it was last seen, and when; where it is taken to stand if it is not seen now. The mean length
+# of its bone, and over how many frames.
+_JOINT = np.dtype(
+    [
+        ("parent", np.int64),
+        ("rest", np.float64, 3),
+        ("offset", np.float64, 3),
+        ("seen_at", np.float64),
+        ("guess", np.float64, 3),
+        ("length", np.float64),
+        ("count", np.int64),
+    ]
+)
+
+_Function = TypeVar("_Function", bound=Callable[..., object])
+
+
+def _kernel(function: _Function) -> _Function:
+    """Compile; not as the solvers do, which this room does not know."""
+    return cast(_Function, njit(cache=True, nogil=True, error_model="numpy")(function))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -32,19 +61,16 @@ class FilledFrame:
     """
 
     positions: Array
-    filled: NDArray[np.bool_]
+    filled: Bools
 
 
-@dataclass(slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False)
 class _Memory:
-    """What is known of one performer: offsets (J, 3) [m] of joints from their parents as last seen,
-    when (J,) [s], the mean length (J,) [m] of each bone and over how many frames (J,)."""
+    """What is known of one performer: of each joint, and where the root (3,) [m] was, NaN before
+    the first frame."""
 
-    offsets: Array
-    seen_at: Array
-    lengths: Array
-    counts: Array
-    root: Array | None = None
+    joints: Records
+    root: Array
 
 
 class Filler:
@@ -64,9 +90,14 @@ class Filler:
         self.skeleton = skeleton
         self.hold = hold
         self.ease = ease
-        self._parents = np.where(skeleton.parents < 0, skeleton.root, skeleton.parents)
-        self._rest = skeleton.rest_positions - skeleton.rest_positions[self._parents]
-        self._rest_lengths = np.linalg.norm(self._rest, axis=1)
+        rest = skeleton.rest_positions
+        self._order = np.array(skeleton.order, dtype=np.int64)
+        self._rest_root = rest[skeleton.root].copy()
+        self._unseen = np.zeros(len(rest), _JOINT)
+        parents = np.where(skeleton.parents < 0, skeleton.root, skeleton.parents)
+        self._unseen["parent"] = parents
+        self._unseen["rest"] = self._unseen["offset"] = rest - rest[parents]
+        self._unseen["seen_at"] = -np.inf
         self._memories: dict[int, _Memory] = {}
 
     def fill(self, frame: SkeletonFrame) -> FilledFrame:
@@ -84,96 +115,133 @@ class Filler:
         Raises:
             ValueError: it has not the skeleton's number of joints.
         """
-        if positions.shape != self._rest.shape:
-            raise ValueError(f"Expected positions {self._rest.shape}, got {positions.shape}")
-        near: NDArray[np.bool_] = np.abs(positions) <= FARTHEST  # False for NaN
-        seen = np.logical_and.reduce(near, axis=1)
-        memory = self._memory(performer, time)
-        self._measure(memory, positions, seen)
-        placed = np.where(seen[:, None], positions, 0.0)
-        if not seen.all():
-            self._place(placed, seen, self._offsets(memory, time), memory)
-        self._remember(memory, placed, seen, time)
-        return FilledFrame(placed, ~seen)
+        expected = (len(self._unseen), 3)
+        if positions.shape != expected:
+            raise ValueError(f"Expected positions {expected}, got {positions.shape}")
+        memory = self._memory(performer)
+        placed, filled = positions.copy(), np.empty(len(positions), dtype=np.bool_)
+        if _look(memory.joints, placed, filled, time):
+            scale = _scale(memory.joints)
+            _guess(memory.joints, scale, time, self.hold, self.ease)
+            root = self._rest_root * scale if np.isnan(memory.root[0]) else memory.root
+            _place(memory.joints, self._order, placed, filled, root)
+        _remember(memory.joints, placed, filled, time)
+        memory.root[:] = placed[self._order[0]]
+        return FilledFrame(placed, filled)
 
-    def _memory(self, performer: int, time: float) -> _Memory:
-        if performer not in self._memories:
-            count = len(self._rest)
-            long_ago = np.full(count, -np.inf)
-            self._memories[performer] = _Memory(
-                self._rest.copy(), long_ago, np.zeros(count), np.zeros(count)
-            )
+    def _memory(self, performer: int) -> _Memory:
+        memory = self._memories.get(performer)
+        if memory is None:
+            memory = _Memory(self._unseen.copy(), np.full(3, np.nan))
+            self._memories[performer] = memory
             if len(self._memories) > MOST_PERFORMERS:
                 del self._memories[next(iter(self._memories))]
-        memory = self._memories[performer]
-        np.minimum(memory.seen_at, time, out=memory.seen_at)  # a clock that went back
         return memory
 
-    def _measure(self, memory: _Memory, positions: Array, seen: NDArray[np.bool_]) -> None:
-        bones = seen & seen[self._parents] & (self._rest_lengths > 0)
-        ends = positions[bones] - positions[self._parents[bones]]
-        memory.counts[bones] += 1
-        step = np.linalg.norm(ends, axis=1) - memory.lengths[bones]
-        memory.lengths[bones] += step / memory.counts[bones]
 
-    def _scale(self, memory: _Memory) -> float:
-        """How much larger the performer is than the rest pose."""
-        bones = (memory.counts > 0) & (memory.lengths > 0)
-        if not bones.any():
-            return 1.0
-        return float(np.median(memory.lengths[bones] / self._rest_lengths[bones]))
-
-    def _offsets(self, memory: _Memory, time: float) -> Array:
-        """(J, 3) [m] where each joint stands from its parent if it is not seen now."""
-        rest = self._rest * self._scale(memory)
-        age = np.maximum(time - memory.seen_at, 0.0) - self.hold
-        w = np.clip(age / self.ease, 0.0, 1.0) if self.ease > 0 else (age > 0).astype(np.float64)
-        return turn(memory.offsets, rest, w * w * (3.0 - 2.0 * w))
-
-    def _place(
-        self, positions: Array, seen: NDArray[np.bool_], offsets: Array, memory: _Memory
-    ) -> None:
-        order, parents = self.skeleton.order, self._parents
-        placed = seen.copy()
-        if not placed[order[0]]:
-            joint = next((joint for joint in order if seen[joint]), None)
-            if joint is None:
-                rest_root = self.skeleton.rest_positions[order[0]] * self._scale(memory)
-                positions[order[0]] = rest_root if memory.root is None else memory.root
-                placed[order[0]] = True
-            while joint is not None and joint != order[0]:
-                positions[parents[joint]] = positions[joint] - offsets[joint]
-                joint = int(parents[joint])
-                placed[joint] = True
-        for joint in order:
-            if not placed[joint]:
-                positions[joint] = positions[parents[joint]] + offsets[joint]
-
-    def _remember(
-        self, memory: _Memory, positions: Array, seen: NDArray[np.bool_], time: float
-    ) -> None:
-        # A joint whose parent was guessed keeps its old offset only while the guess came from it;
-        # elsewhere the offset from the guess is what keeps the joint still when it disappears.
-        memory.root = positions[self.skeleton.root].copy()
-        memory.offsets[seen] = positions[seen] - positions[self._parents[seen]]
-        memory.seen_at[seen] = time
+@_kernel
+def was_seen(place: Array) -> bool:
+    """Whether a place (3,) [m] has no NaN and lies not beyond `FARTHEST`."""
+    x, y, z = np.abs(place)
+    return bool(x <= FARTHEST and y <= FARTHEST and z <= FARTHEST)
 
 
-def turn(start: Array, end: Array, weight: Array) -> Array:
-    """Vectors (n, 3) from `start` to `end` by `weight` (n,) in [0, 1]: direction by slerp, length
-    linearly. Opposite directions turn by way of an axis at right angles to them."""
-    lengths = np.linalg.norm(start, axis=1), np.linalg.norm(end, axis=1)
-    straight = (1.0 - weight)[:, None] * start + weight[:, None] * end
-    valid = (lengths[0] > 1e-9) & (lengths[1] > 1e-9)
-    a = start / np.where(valid, lengths[0], 1.0)[:, None]
-    b = end / np.where(valid, lengths[1], 1.0)[:, None]
-    cosine = np.clip(np.einsum("ij,ij->i", a, b), -1.0, 1.0)
-    side = b - cosine[:, None] * a
-    flat = np.linalg.norm(side, axis=1) < 1e-6
-    least = np.eye(3)[np.argmin(np.abs(a), axis=1)]
-    side = np.where(flat[:, None], np.cross(a, least), side)
-    side /= np.maximum(np.linalg.norm(side, axis=1), 1e-12)[:, None]
-    angle = (weight * np.arccos(cosine))[:, None]
-    length = ((1.0 - weight) * lengths[0] + weight * lengths[1])[:, None]
-    turned = length * (np.cos(angle) * a + np.sin(angle) * side)
-    return np.where(valid[:, None], turned, straight)
+@_kernel
+def _look(joints: Records, positions: Array, filled: Bools, time: float) -> bool:
+    """Tell which joints must be filled, and whether any; measure the bones that are seen."""
+    for index, joint in enumerate(joints):
+        filled[index] = not was_seen(positions[index])
+        joint.seen_at = min(joint.seen_at, time)  # a clock that went back
+    for index, joint in enumerate(joints):
+        if not filled[index] and not filled[joint.parent] and _length(joint.rest) > 0.0:
+            joint.count += 1
+            length = _length(positions[index] - positions[joint.parent])
+            joint.length += (length - joint.length) / joint.count
+    return bool(filled.any())
+
+
+@_kernel
+def _scale(joints: Records) -> float:
+    """How much larger the performer is than the rest pose."""
+    ratios = np.empty(len(joints))
+    known = 0
+    for joint in joints:
+        if joint.count > 0 and joint.length > 0.0:
+            ratios[known] = joint.length / _length(joint.rest)
+            known += 1
+    return float(np.median(ratios[:known])) if known > 0 else 1.0
+
+
+@_kernel
+def _guess(joints: Records, scale: float, time: float, hold: float, ease: float) -> None:
+    """Tell where each joint stands from its parent if it is not seen now."""
+    for joint in joints:
+        age = time - joint.seen_at - hold
+        w = min(age / ease, 1.0) if age > 0.0 else 0.0
+        turn(joint.offset, joint.rest * scale, w * w * (3.0 - 2.0 * w), joint.guess)
+
+
+@_kernel
+def _place(joints: Records, order: Indices, positions: Array, filled: Bools, root: Array) -> None:
+    """Put joints that must be filled where they stand from their parents."""
+    placed = ~filled
+    if filled[order[0]]:
+        positions[order[0]] = root
+        placed[order[0]] = True
+        joint = _nearest_seen(order, filled)
+        while joint != order[0]:
+            parent = joints[joint].parent
+            positions[parent] = positions[joint] - joints[joint].guess
+            placed[parent] = True
+            joint = parent
+    for joint in order:
+        if not placed[joint]:
+            positions[joint] = positions[joints[joint].parent] + joints[joint].guess
+
+
+@_kernel
+def _nearest_seen(order: Indices, filled: Bools) -> int:
+    for joint in order:
+        if not filled[joint]:
+            return int(joint)
+    return int(order[0])
+
+
+@_kernel
+def _remember(joints: Records, positions: Array, filled: Bools, time: float) -> None:
+    # A joint whose parent was guessed keeps its old offset only while the guess came from it;
+    # elsewhere the offset from the guess is what keeps the joint still when it disappears.
+    for index, joint in enumerate(joints):
+        if not filled[index]:
+            joint.offset[:] = positions[index] - positions[joint.parent]
+            joint.seen_at = time
+
+
+@_kernel
+def turn(start: Array, end: Array, weight: float, out: Array) -> None:
+    """Put a vector on its way from `start` to `end` (3,), by `weight` in [0, 1], into `out` (3,).
+
+    The direction goes by slerp, the length linearly. Opposite directions turn by way of an axis at
+    right angles to them.
+    """
+    before, after = _length(start), _length(end)
+    if min(before, after) <= 1e-9:
+        out[:] = (1.0 - weight) * start + weight * end
+        return
+    a, b = start / before, end / after
+    cosine = min(max((a * b).sum(), -1.0), 1.0)
+    side = b - cosine * a
+    sine = _length(side)
+    if sine < 1e-6:
+        least = np.zeros(3)
+        least[np.argmin(np.abs(a))] = 1.0
+        side = np.cross(a, least)
+    side /= max(_length(side), 1e-12)
+    angle = weight * np.arctan2(sine, cosine)
+    length = (1.0 - weight) * before + weight * after
+    out[:] = length * (np.cos(angle) * a + np.sin(angle) * side)
+
+
+@_kernel
+def _length(vector: Array) -> float:
+    return float(np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2))

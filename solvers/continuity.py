@@ -10,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.compiled import kernel
+
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Indices = NDArray[np.int64]
@@ -22,21 +24,31 @@ LEAST_WRONG = 0.1  # [m] that exchanged points are from where they are expected
 FAR_BETTER = 0.25  # of the squared distance that must be left when the names are exchanged back
 
 
-def expected(last: Array, velocity: Array, gap: Array) -> Array:
-    """Where points (n, 3) [m] should be by now.
+@kernel
+def expect(last: Array, velocity: Array, gap: float, wanted: Array) -> None:
+    """Where a point should be by now.
 
     Args:
-        last: (n, 3) [m] where they were.
-        velocity: (n, 3) [m/s] how they moved then.
-        gap: (n,) [s] since then.
+        last: (3,) [m] where it was.
+        velocity: (3,) [m/s] how it moved then.
+        gap: [s] since then.
+        wanted: (3,) [m] takes the answer.
     """
-    step = velocity * (DAMPING * gap)[:, None]
-    length = np.sqrt(np.einsum("ij,ij->i", step, step))
-    step *= (FURTHEST_STEP / np.maximum(length, FURTHEST_STEP))[:, None]
-    moved: Array = last + step
-    return moved
+    go_on = DAMPING * gap
+    speed = np.sqrt(velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2)
+    go_on *= FURTHEST_STEP / max(speed * abs(go_on), FURTHEST_STEP)
+    for axis in range(3):
+        wanted[axis] = last[axis] + velocity[axis] * go_on
 
 
+@kernel
+def distance(a: Array, b: Array) -> float:
+    """How far apart two points (3,) are; NaN where one is unknown."""
+    x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
+    return np.sqrt(x * x + y * y + z * z)  # type: ignore[no-any-return]
+
+
+@kernel
 def exchanged(seen: Array, wanted: Array, partner: Indices, group: Indices) -> Bools:
     """Which groups of points stand where their partners should stand, and the other way round.
 
@@ -49,20 +61,18 @@ def exchanged(seen: Array, wanted: Array, partner: Indices, group: Indices) -> B
     Returns:
         (G,) for each group whether putting its points back is far better than leaving them.
     """
-    known: Bools = (group >= 0) & np.isfinite(seen[:, 0] + wanted[:, 0])
-    known &= known[partner]
-    of = np.where(known, group, 0)
-    groups = int(group.max(initial=-1)) + 1
-    back = seen[partner]
-
-    def total(a: Array, b: Array) -> Array:
-        offset = np.where(known[:, None], a - b, 0.0)
-        squares: Array = np.einsum("ij,ij->i", offset, offset)
-        return np.bincount(of, squares, groups).astype(np.float64)
-
-    count = np.bincount(of, known, groups)
-    straight, crossed = total(seen, wanted), total(back, wanted)
-    apart = total(wanted, wanted[partner])
+    groups = group.max() + 1
+    straight, crossed, apart = np.zeros(groups), np.zeros(groups), np.zeros(groups)
+    count = np.zeros(groups)
+    for point, of in enumerate(group):
+        other = partner[point]
+        off = distance(seen[point], wanted[point])
+        if of < 0 or np.isnan(off) or np.isnan(distance(seen[other], wanted[other])):
+            continue
+        count[of] += 1
+        straight[of] += off**2
+        crossed[of] += distance(seen[other], wanted[point]) ** 2
+        apart[of] += distance(wanted[point], wanted[other]) ** 2
     told: Bools = (
         (count > 0)
         & (apart > LEAST_APART**2 * count)

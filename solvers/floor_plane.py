@@ -6,8 +6,12 @@ level as long as the feet have stood at one place only, where any slope would fi
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
+
+from solvers.compiled import kernel
 
 Array = NDArray[np.float64]
 
@@ -31,19 +35,32 @@ class FloorFit:
     def add(self, points: Array, dt: float) -> None:
         """Take in where feet stood (n, 3) [m] for `dt` [s]."""
         keep = 0.5 ** (dt / MEMORY)
-        rows = np.column_stack([points[:, 0], points[:, 2], np.ones(len(points))])
-        self._normal = keep * self._normal + dt * rows.T @ rows
-        self._right = keep * self._right + dt * rows.T @ points[:, 1]
+        _add(self._normal, self._right, points, keep, dt)
         self.weight = keep * self.weight + dt * len(points)
 
     def plane(self) -> tuple[float, float, float]:
         """The slopes along x and z and the height [m] at the origin; level at 0 before any step."""
         if self.weight <= 0.0:
             return 0.0, 0.0, 0.0
-        middle = self._normal[2, :2] / self.weight
-        height = self._right[2] / self.weight
-        spread = self._normal[:2, :2] - self.weight * np.outer(middle, middle)
-        rise = self._right[:2] - middle * self._right[2]
-        slope = np.linalg.solve(spread + STIFFNESS * np.eye(2), rise)
-        slope *= min(1.0, STEEPEST / max(float(np.linalg.norm(slope)), STEEPEST))
-        return float(slope[0]), float(slope[1]), float(height - slope @ middle)
+        (xx, xz, x), (_, zz, z), _ = self._normal.tolist()
+        xy, zy, y = self._right.tolist()
+        middle_x, middle_z, middle_y = x / self.weight, z / self.weight, y / self.weight
+        xx, xz, zz = xx + STIFFNESS - x * middle_x, xz - x * middle_z, zz + STIFFNESS - z * middle_z
+        xy, zy = xy - y * middle_x, zy - y * middle_z
+        determinant = xx * zz - xz * xz  # at least STIFFNESS squared
+        a, b = (zz * xy - xz * zy) / determinant, (xx * zy - xz * xy) / determinant
+        gentle = STEEPEST / max(math.hypot(a, b), STEEPEST)
+        a, b = a * gentle, b * gentle
+        return a, b, middle_y - a * middle_x - b * middle_z
+
+
+@kernel
+def _add(normal: Array, right: Array, points: Array, keep: float, dt: float) -> None:
+    normal *= keep
+    right *= keep
+    for point in points:
+        row = point[0], point[2], 1.0
+        for i in range(3):
+            right[i] += dt * row[i] * point[1]
+            for j in range(3):
+                normal[i, j] += dt * row[i] * row[j]

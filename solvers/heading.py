@@ -32,14 +32,23 @@ def heading(positions: Array, pairs: NDArray[np.int64], before: float = 0.0) -> 
     Returns:
         The heading [rad], 0 facing +Z, positive to the body's left.
     """
-    if len(pairs) == 0:
+    x, y, z = _across(positions, pairs)
+    level = math.hypot(x, z)
+    if level <= LEVEL * math.hypot(level, y) or level == 0.0:
         return before
-    across = (positions[pairs[:, 0]] - positions[pairs[:, 1]]).sum(axis=0)
-    level = float(np.hypot(across[0], across[2]))
-    if level <= LEVEL * float(np.linalg.norm(across)) or level == 0.0:
-        return before
-    angle = float(np.arctan2(-across[2], across[0]))
-    return before + (angle - before + np.pi) % (2.0 * np.pi) - np.pi
+    angle = math.atan2(-z, x)
+    return before + (angle - before + math.pi) % (2.0 * math.pi) - math.pi
+
+
+@kernel
+def _across(positions: Array, pairs: NDArray[np.int64]) -> tuple[float, float, float]:
+    """From the right joints to the left ones, summed."""
+    x = y = z = 0.0
+    for left, right in pairs:
+        x += positions[left, 0] - positions[right, 0]
+        y += positions[left, 1] - positions[right, 1]
+        z += positions[left, 2] - positions[right, 2]
+    return x, y, z
 
 
 def turned(positions: Array, angle: float, about: Array) -> Array:

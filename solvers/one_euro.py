@@ -11,6 +11,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.compiled import kernel
+
 Array = NDArray[np.float64]
 
 MIN_CUTOFF = 2.0
@@ -26,16 +28,19 @@ DERIVATIVE_CUTOFF = 3.0
 NO_TIME = 1e-6
 """[s] and less between two samples tell no velocity."""
 
+# Of each point: the newest sample, the smoothed one, the smoothed velocity.
+_POINT = np.dtype([(name, np.float64, 3) for name in ("raw", "smooth", "velocity")])
 
-def smoothing_factor(cutoff: Array | float, dt: float) -> Array:
+
+@kernel
+def smoothing_factor(cutoff: float, dt: float) -> float:
     """The weight of the newest sample in exponential smoothing.
 
     Args:
-        cutoff: [Hz] any shape, above 0.
+        cutoff: [Hz] above 0.
         dt: [s] since the sample before, above 0.
     """
-    factor: Array = np.asarray(1.0 / (1.0 + 1.0 / (2.0 * np.pi * dt * np.asarray(cutoff))))
-    return factor
+    return 1.0 / (1.0 + 1.0 / (2.0 * np.pi * dt * cutoff))
 
 
 class OneEuroFilter:
@@ -49,8 +54,6 @@ class OneEuroFilter:
         speed_coefficient: [Hz s/m] by how much the cutoff rises with speed.
         derivative_cutoff: [Hz] of the velocity that is used for that.
 
-    Attributes:
-        velocity: (n, 3) [m/s] the smoothed velocity; None before the first sample.
     """
 
     def __init__(
@@ -62,13 +65,16 @@ class OneEuroFilter:
         self.min_cutoff = min_cutoff
         self.speed_coefficient = speed_coefficient
         self.derivative_cutoff = derivative_cutoff
-        self.velocity: Array | None = None
-        self._raw: Array | None = None
-        self._smooth: Array | None = None
+        self._points: NDArray[np.void] | None = None
+
+    @property
+    def velocity(self) -> Array | None:
+        """(n, 3) [m/s] the smoothed velocity; None before the first sample."""
+        return None if self._points is None else self._points["velocity"]
 
     def reset(self) -> None:
         """Forget every sample; the next one comes out as it is."""
-        self.velocity = self._raw = self._smooth = None
+        self._points = None
 
     def filter(self, points: Array, dt: float) -> Array:
         """Points (n, 3) [m], smoothed.
@@ -77,16 +83,26 @@ class OneEuroFilter:
             points: (n, 3) [m], finite; n may not change between samples.
             dt: [s] since the sample before; a sample that took no time changes nothing.
         """
-        if self._raw is None or self._smooth is None or self.velocity is None:
-            self._raw = self._smooth = points.copy()
-            self.velocity = np.zeros_like(points)
+        if self._points is None:
+            self._points = np.zeros(len(points), _POINT)
+            self._points["raw"] = self._points["smooth"] = points
         elif dt > NO_TIME:
-            slope = (points - self._raw) / dt
-            weight = smoothing_factor(self.derivative_cutoff, dt)
-            self.velocity = self.velocity + weight * (slope - self.velocity)
-            speed = np.sqrt(np.einsum("ij,ij->i", self.velocity, self.velocity))
-            cutoff = self.min_cutoff + self.speed_coefficient * speed
-            weight = smoothing_factor(cutoff, dt)[:, None]
-            self._smooth = self._smooth + weight * (points - self._smooth)
-            self._raw = points.copy()
-        return self._smooth
+            cutoffs = self.min_cutoff, self.speed_coefficient, self.derivative_cutoff
+            _smooth(self._points, points, dt, cutoffs)
+        return self._points["smooth"].copy()
+
+
+@kernel
+def _smooth(
+    memory: NDArray[np.void], samples: Array, dt: float, cutoffs: tuple[float, float, float]
+) -> None:
+    least, coefficient, of_velocity = cutoffs
+    weight = smoothing_factor(of_velocity, dt)
+    for index, point in enumerate(memory):
+        sample = samples[index]
+        slope = (sample - point.raw) / dt
+        point.velocity += weight * (slope - point.velocity)
+        speed = np.sqrt((point.velocity**2).sum())
+        share = smoothing_factor(least + coefficient * speed, dt)
+        point.smooth += share * (sample - point.smooth)
+        point.raw[:] = sample

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.compiled import kernel
 from solvers.one_euro import NO_TIME, smoothing_factor
 
 Array = NDArray[np.float64]
@@ -26,7 +27,7 @@ class Predictor:
     def reset(self) -> None:
         """Forget all motion."""
         self._before: Array | None = None
-        self._velocity: Array | float = 0.0
+        self._velocity: Array | None = None
         self._step = 0.0
 
     def predict(self, points: Array, dt: float) -> Array:
@@ -36,11 +37,21 @@ class Predictor:
             points: (n, 3) [m], finite.
             dt: [s] since the sample before, which the next is expected to take too.
         """
-        if self._before is not None and dt > NO_TIME:
-            slope = (points - self._before) / dt
-            weight = smoothing_factor(VELOCITY_CUTOFF, dt)
+        if self._before is None or self._velocity is None:
+            self._before, self._velocity = points.copy(), np.zeros_like(points)
+        elif dt > NO_TIME:
             self._step = min(dt, MOST)
-            self._velocity = self._velocity + weight * (slope - self._velocity)
-        self._before = points.copy()
+            _follow(points, self._before, self._velocity, dt)
+        self._before[:] = points
         ahead: Array = points + self._velocity * (GOES_ON * self._step)
         return ahead
+
+
+@kernel
+def _follow(points: Array, before: Array, velocity: Array, dt: float) -> None:
+    """Smooth the velocity (n, 3) of points (n, 3) that were `before`."""
+    weight = smoothing_factor(VELOCITY_CUTOFF, dt)
+    for i in range(len(points)):
+        for axis in range(3):
+            slope = (points[i, axis] - before[i, axis]) / dt
+            velocity[i, axis] += weight * (slope - velocity[i, axis])

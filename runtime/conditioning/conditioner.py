@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.skeleton import Skeleton, SkeletonFrame
-from replay.fill import FARTHEST, Filler
+from replay.fill import Filler
 from runtime.conditioning.body import body_of
 from runtime.conditioning.faults import Faults
 from runtime.conditioning.held_pose import HeldPose
@@ -107,25 +107,30 @@ class Conditioner:
         on, memory = self.switches, self._memory(frame.performer)
         dt = frame.time - memory.at
         memory.at = frame.time
-        positions, corrected = frame.positions, self._nothing
+        positions, corrected, predicted = frame.positions, self._nothing, self._nothing
         if on.swaps or on.outliers:
-            positions, corrected = self._mend(memory, frame)
+            mended = memory.faults.mend(positions, frame.time, swaps=on.swaps, outliers=on.outliers)
+            positions, corrected = mended.positions, mended.corrected
         whole = self._filler.place(positions, frame.time, frame.performer)
-        positions, predicted = whole.positions, self._nothing
+        positions, filled = whole.positions, whole.filled
         if on.outliers:
-            positions, late = memory.rejoining.lead(positions, whole.filled, frame.time)
+            positions, late = memory.rejoining.lead(positions, filled, frame.time)
             corrected = corrected | late
         else:
             memory.rejoining.forget()
         positions = self._smooth(memory, positions, dt)
         if on.predict:
             ahead = memory.predictor.predict(positions, dt)
-            positions = np.where(whole.filled[:, None], positions, ahead)
-            predicted = ~whole.filled
+            positions, predicted = np.where(filled[:, None], positions, ahead), ~filled
         else:
             memory.predictor.reset()
-        placed = ConditionedFrame(positions, whole.filled, corrected, predicted, False, False, 1.0)
-        return self._on_stage(placed, memory, frame.time)
+        positions, scale = self._on_stage(positions, filled, memory, frame.time)
+        flags = filled, corrected, predicted
+        if mirror := on.mirror:
+            other = self._body.partner
+            positions = mirrored(positions, other)
+            flags = filled[other], corrected[other], predicted[other]
+        return ConditionedFrame(positions, *flags, mirror, on.scale, scale)
 
     def _memory(self, performer: int) -> _Memory:
         memory = self._memories.get(performer)
@@ -138,13 +143,6 @@ class Conditioner:
                 del self._memories[next(iter(self._memories))]
         return memory
 
-    def _mend(self, memory: _Memory, frame: SkeletonFrame) -> tuple[Array, Bools]:
-        on = self.switches
-        near = np.logical_and.reduce(np.abs(frame.positions) <= FARTHEST, axis=1)
-        positions = np.where(near[:, None], frame.positions, np.nan)
-        mended = memory.faults.mend(positions, frame.time, swaps=on.swaps, outliers=on.outliers)
-        return mended.positions, mended.exchanged | mended.rejected
-
     def _smooth(self, memory: _Memory, positions: Array, dt: float) -> Array:
         if not abs(dt) <= LONGEST_GAP:
             memory.filter.reset()
@@ -154,21 +152,17 @@ class Conditioner:
         memory.filter.reset()
         return positions
 
-    def _on_stage(self, frame: ConditionedFrame, memory: _Memory, time: float) -> ConditionedFrame:
-        """Level, mirrored and as tall as everybody, as asked for."""
-        on, positions, scale = self.switches, frame.positions, 1.0
+    def _on_stage(
+        self, positions: Array, filled: Bools, memory: _Memory, time: float
+    ) -> tuple[Array, float]:
+        """Level, and as tall as everybody, as asked for; and how many times as tall as before."""
+        on, scale = self.switches, 1.0
         if on.level:
-            self.levelling.watch(positions, frame.filled, time)
+            self.levelling.watch(positions, filled, time)
             positions = self.levelling.level(positions)
-        memory.stature.watch(positions, frame.filled, time)
+        memory.stature.watch(positions, filled, time)
         if on.scale:
             scale = memory.stature.factor
             positions = positions if scale == 1.0 else positions * scale
-        self.held = on.recalibrate and memory.held.watch(positions, frame.filled, time)
-        mirror, other = on.mirror, self._body.partner
-        if not mirror:
-            flags = frame.filled, frame.corrected, frame.predicted
-        else:
-            positions = mirrored(positions, other)
-            flags = frame.filled[other], frame.corrected[other], frame.predicted[other]
-        return ConditionedFrame(positions, *flags, mirror, on.scale, scale)
+        self.held = on.recalibrate and memory.held.watch(positions, filled, time)
+        return positions, scale

@@ -6,15 +6,20 @@ Both are judged by where the joints were and how they moved when they were last 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.fill import was_seen
 from runtime.conditioning.body import Body
-from solvers.continuity import LEAST_WRONG, exchanged, expected
+from solvers.compiled import kernel
+from solvers.continuity import LEAST_WRONG, distance, exchanged, expect
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+Records = NDArray[np.void]
+Record = Any  # one of them, which numba writes through
 
 FORGET = 0.5  # [s] after which nothing is expected of a joint any more
 SHORTEST = 1e-3  # [s] between two frames, for velocities
@@ -36,20 +41,35 @@ BONE_STEP = 0.02  # of its length that a bone's usual length gives way, each fra
 BONES_MEASURED = 10  # frames
 
 
-@dataclass(slots=True, eq=False)
-class _Trust:
-    """Of each joint: where and when it was last believed, its velocity, how often; since when and
-    where it has been doubted; of each bone its usual length and how often it was measured."""
+# Of each joint: its partner, and its limbs. Where and when it was last believed,
+# its velocity, how often; where and since when it has been doubted, how often. In this frame: where
+# it is expected, how far from there it is and may be, whether it was corrected.
+_JOINT = np.dtype(
+    [
+        ("partner", np.int64),
+        ("limb", np.int64),
+        ("place", np.float64, 3),
+        ("velocity", np.float64, 3),
+        ("at", np.float64),
+        ("times", np.int64),
+        ("doubted", np.float64, 3),
+        ("doubted_at", np.float64),
+        ("doubts", np.int64),
+        ("wanted", np.float64, 3),
+        ("off", np.float64),
+        ("reach", np.float64),
+        ("corrected", np.bool_),
+    ],
+    align=True,
+)
 
-    place: Array
-    velocity: Array
-    at: Array
-    times: NDArray[np.int64]
-    doubted: Array
-    doubted_at: Array
-    doubts: NDArray[np.int64]
-    lengths: Array
-    measured: NDArray[np.int64]
+# Of each long bone: its ends, its usual length, how often that was measured.
+_BONE = np.dtype(
+    [("far", np.int64), ("near", np.int64), ("usual", np.float64), ("measured", np.int64)]
+)
+
+# Of each pair of limbs: since when they are exchanged, and since when they were not; NaN for never.
+_LIMB = np.dtype([("since", np.float64), ("straight", np.float64)])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,13 +78,11 @@ class Mended:
 
     Attributes:
         positions: (J, 3) [m]; NaN where not seen or not believed.
-        exchanged: (J,) bool, the joint's place was called its partner's.
-        rejected: (J,) bool, the joint was seen but not believed.
+        corrected: (J,) bool, the joint was seen, but not believed or called by its partner's name.
     """
 
     positions: Array
-    exchanged: Bools
-    rejected: Bools
+    corrected: Bools
 
 
 class Faults:
@@ -76,149 +94,193 @@ class Faults:
     """
 
     def __init__(self, body: Body, joints: int) -> None:
-        self._body = body
-        self._trust = _Trust(
-            np.full((joints, 3), np.nan),
-            np.zeros((joints, 3)),
-            np.full(joints, -np.inf),
-            np.zeros(joints, dtype=np.int64),
-            np.full((joints, 3), np.nan),
-            np.full(joints, np.nan),
-            np.zeros(joints, dtype=np.int64),
-            np.zeros(len(body.bones)),
-            np.zeros(len(body.bones), dtype=np.int64),
-        )
-        groups = int(body.group.max(initial=-1)) + 1
-        self._since = np.full(groups, np.nan)  # [s] when a group began to be exchanged
-        self._straight = np.full(groups, np.nan)  # [s] when it began not to be
-        self._nothing = np.zeros(joints, dtype=bool)
+        self._joints = np.zeros(joints, _JOINT)
+        self._joints["partner"], self._joints["limb"] = body.partner, body.group
+        self._joints["place"] = self._joints["doubted"] = np.nan
+        self._joints["at"] = -np.inf
+        self._bones = np.zeros(len(body.bones), _BONE)
+        self._bones["far"], self._bones["near"] = body.bones, body.near
+        self._beyond = body.beyond
+        self._limbs = np.full(int(body.group.max(initial=-1)) + 1, np.nan, _LIMB)
 
     def mend(self, positions: Array, time: float, *, swaps: bool, outliers: bool) -> Mended:
         """The frame with its faults mended.
 
         Args:
-            positions: (J, 3) [m]; NaN where not seen.
+            positions: (J, 3) [m]; NaN where not seen, and what `replay.fill` does not count as
+                seen either.
             time: [s].
             swaps: put exchanged limbs right.
             outliers: reject what cannot be.
         """
-        trust = self._trust
-        gap = time - trust.at
-        fresh = (gap < FORGET) & (gap > -FORGET)
-        wanted = expected(trust.place, trust.velocity, np.where(fresh, gap, 0.0))
-        wanted[~fresh] = np.nan
-        swapped = rejected = self._nothing
-        distance = _distance(positions, wanted)
-        if swaps and len(self._since) and (distance > LEAST_WRONG).any():  # else nothing can be
-            swapped = self._exchanged(positions, wanted, time)
-            if swapped.any():
-                positions = np.where(swapped[:, None], positions[self._body.partner], positions)
-                distance = _distance(positions, wanted)
-        elif swaps:
-            self._since[:] = np.nan
-            self._straight[np.isnan(self._straight)] = time
-        seen = np.isfinite(positions[:, 0])
+        joints, mended = self._joints, positions.copy()
+        wrong = _expect(joints, mended, time)
+        if swaps and len(self._limbs):
+            _put_right(joints, self._limbs, mended, time, wrong)
         if outliers:
-            rejected = seen & self._doubtful(positions, distance, gap, seen, time)
-            if rejected.any():
-                positions = np.where(rejected[:, None], np.nan, positions)
-                seen = seen & ~rejected
-        self._believe(positions, seen, time)
-        return Mended(positions, swapped & seen, rejected)
-
-    def _exchanged(self, positions: Array, wanted: Array, time: float) -> Bools:
-        """Which joints (J,) bear their partners' names.
-
-        A device that goes on saying so for longer than it had said otherwise is believed.
-        """
-        groups = exchanged(positions, wanted, self._body.partner, self._body.group)
-        self._since[~groups] = np.nan
-        started = groups & np.isnan(self._since)
-        self._since[started] = time
-        self._straight[~groups & np.isnan(self._straight)] = time
-        if not groups.any():
-            return self._nothing
-        before = np.nan_to_num(self._since - self._straight)
-        patience = np.clip(before, INSIST_AT_LEAST, INSIST_AT_MOST)
-        insists = groups & (time - self._since > patience)
-        self._straight[insists] = time
-        self._since[insists] = np.nan
-        believed = groups & ~insists
-        joints: Bools = np.append(believed, False)[self._body.group]
-        if insists.any():  # nothing is known any more of these limbs
-            self._trust.at[np.append(insists, False)[self._body.group]] = -np.inf
-        return joints
-
-    def _doubtful(
-        self, positions: Array, distance: Array, gap: Array, seen: Bools, time: float
-    ) -> Bools:
-        trust = self._trust
-        reach = JUMP + FASTEST * np.clip(gap, 0.0, LONGEST_REACH)
-        far: Bools = distance > reach  # False where nothing is expected
-        far &= trust.times >= BELIEVED
-        stretched = self._stretched(positions, distance)
-        if not far.any():
-            trust.doubts[:] = 0
-            return stretched
-        cut = np.count_nonzero(far) >= CUT * np.count_nonzero(seen)
-        return (far & ~self._confirmed(positions, far, time, bool(cut))) | stretched
-
-    def _confirmed(self, positions: Array, doubtful: Bools, time: float, cut: bool) -> Bools:
-        """Which doubtful joints have been so near one place for so long that they are there."""
-        trust = self._trust
-        step = positions - trust.doubted
-        since = np.where(trust.doubts > 0, time - trust.doubted_at, 0.0)
-        still = np.einsum("ij,ij->i", step, step) < (JUMP + 2.0 * np.maximum(since, 0.0)) ** 2
-        trust.doubts = np.where(doubtful, np.where(still, trust.doubts, 0) + 1, 0)
-        first = trust.doubts == 1
-        trust.doubted_at[first] = time
-        trust.doubted[doubtful] = positions[doubtful]
-        confirmed: Bools = trust.doubts >= CONFIRMED_CUT
-        if not cut:
-            confirmed &= time - trust.doubted_at >= CONFIRMED_SECONDS
-        return confirmed
-
-    def _stretched(self, positions: Array, distance: Array) -> Bools:
-        """The less expected ends of the long bones that have not their usual length.
-
-        What hangs on them went along, unless the next bone too is stretched at this end. Nobody
-        needs to confirm them: the usual length gives way with time.
-        """
-        body, trust = self._body, self._trust
-        length = _distance(positions[body.bones], positions[body.near])
-        known = np.isfinite(length) & (length > 0.0)
-        length = np.where(known, length, 1.0)
-        usual = np.where(trust.measured > 0, trust.lengths, length)
-        off = np.abs(np.log(length / usual)) > STRETCHED
-        off &= (np.abs(length - usual) > STRETCHED_BY) & known
-        judged = off & (trust.measured >= BONES_MEASURED)
-        share = np.maximum(BONE_STEP, 1.0 / (trust.measured + 1.0)) * usual
-        step = np.clip(length - usual, -share, share)
-        trust.lengths = np.where(known, usual + step, trust.lengths)
-        trust.measured = trust.measured + known
-        joints = np.zeros(len(positions), dtype=bool)
-        if judged.any():
-            worse = np.nan_to_num(distance[body.bones]) >= np.nan_to_num(distance[body.near])
-            joints[body.near[judged & ~worse]] = True
-            alone = joints[body.bones]
-            joints[body.bones[judged & worse]] = True
-            joints |= body.beyond[judged & worse & ~alone].any(axis=0)
-        return joints
-
-    def _believe(self, positions: Array, seen: Bools, time: float) -> None:
-        trust = self._trust
-        gap = time - trust.at
-        again = seen & (gap < FORGET) & (gap > -FORGET)
-        step = np.where(again, np.maximum(gap, VELOCITY_SECONDS), 1.0)[:, None]
-        velocity = np.where(again[:, None], (positions - trust.place) / step, 0.0)
-        trust.velocity = np.where(seen[:, None], velocity, trust.velocity)
-        trust.place = np.where(seen[:, None], positions, trust.place)
-        trust.times = np.where(seen, np.where(again, trust.times, 0) + 1, trust.times)
-        trust.at = np.where(seen, time, trust.at)
+            _reject(joints, self._bones, self._beyond, mended, time)
+        _believe(joints, mended, time)
+        return Mended(mended, joints["corrected"].copy())
 
 
-def _distance(a: Array, b: Array) -> Array:
-    """How far apart (n,) points are; NaN where one is unknown."""
-    offset = a - b
-    apart: Array = np.sqrt(np.einsum("ij,ij->i", offset, offset))
-    return apart
+@kernel
+def _expect(joints: Records, positions: Array, time: float) -> bool:
+    """Tell where each joint should be; whether any is far enough from there to be exchanged."""
+    wrong = False
+    for index, joint in enumerate(joints):
+        gap = time - joint.at
+        if not was_seen(positions[index]):
+            positions[index] = np.nan
+        joint.corrected = False
+        joint.wanted[:] = np.nan
+        if abs(gap) < FORGET:
+            expect(joint.place, joint.velocity, gap, joint.wanted)
+        joint.off = distance(positions[index], joint.wanted)
+        joint.reach = JUMP + FASTEST * min(max(gap, 0.0), LONGEST_REACH)
+        wrong |= joint.off > LEAST_WRONG
+    return wrong
+
+
+@kernel
+def _put_right(joints: Records, limbs: Records, positions: Array, time: float, wrong: bool) -> None:
+    """Give joints that bear their partners' names their own.
+
+    A device that goes on saying so for longer than it had said otherwise is believed.
+    """
+    told = np.zeros(len(limbs), dtype=np.bool_)
+    if wrong:  # else nothing can be
+        told = exchanged(positions, joints["wanted"], joints["partner"], joints["limb"])
+    insists = np.zeros(len(limbs), dtype=np.bool_)
+    for index, limb in enumerate(limbs):
+        if told[index]:
+            insists[index] = _insists(limb, time)
+        else:
+            limb.since = np.nan
+            limb.straight = time if np.isnan(limb.straight) else limb.straight
+    for index, joint in enumerate(joints):
+        other = joint.partner
+        if joint.limb < 0 or not told[joint.limb]:
+            continue
+        if insists[joint.limb]:
+            joint.at = -np.inf  # nothing is known any more of this limb
+        elif index < other:
+            for axis in range(3):
+                mine = positions[index, axis]
+                positions[index, axis] = positions[other, axis]
+                positions[other, axis] = mine
+            for end in (index, other):
+                joints[end].corrected = not np.isnan(positions[end, 0])
+                joints[end].off = distance(positions[end], joints[end].wanted)
+
+
+@kernel
+def _insists(limb: Record, time: float) -> bool:
+    """Whether a device has said for long enough that a limb's sides are the other way round."""
+    if np.isnan(limb.since):
+        limb.since = time
+    before = 0.0 if np.isnan(limb.straight) else limb.since - limb.straight
+    if time - limb.since <= min(max(before, INSIST_AT_LEAST), INSIST_AT_MOST):
+        return False
+    limb.straight, limb.since = time, np.nan
+    return True
+
+
+@kernel
+def _reject(joints: Records, bones: Records, beyond: Bools, positions: Array, time: float) -> None:
+    """Make joints unseen that jump, or whose bones have not their usual length."""
+    stretched = _stretched(joints, bones, beyond, positions)
+    seen, far = 0, 0
+    for index, joint in enumerate(joints):
+        seen += not np.isnan(positions[index, 0])
+        far += _jumped(joint)
+    cut = far >= CUT * seen
+    for index, joint in enumerate(joints):
+        jumped = _jumped(joint)
+        if jumped:
+            confirmed = _confirmed(joint, positions[index], time, cut)
+        else:
+            confirmed = False
+            joint.doubts = 0
+        if stretched[index] or (jumped and not confirmed):
+            joint.corrected |= not np.isnan(positions[index, 0])
+            positions[index] = np.nan
+
+
+@kernel
+def _jumped(joint: Record) -> bool:
+    # Never where nothing is expected: `off` is NaN there.
+    return bool(joint.times >= BELIEVED and joint.off > joint.reach)
+
+
+@kernel
+def _confirmed(joint: Record, place: Array, time: float, cut: bool) -> bool:
+    """Whether a doubtful joint has been so near one place for so long that it is there."""
+    since = max(time - joint.doubted_at, 0.0) if joint.doubts > 0 else 0.0
+    still = distance(place, joint.doubted) < JUMP + 2.0 * since
+    joint.doubts = joint.doubts + 1 if still else 1
+    if joint.doubts == 1:
+        joint.doubted_at = time
+    joint.doubted[:] = place
+    if joint.doubts < CONFIRMED_CUT:
+        return False
+    return cut or bool(time - joint.doubted_at >= CONFIRMED_SECONDS)
+
+
+@kernel
+def _stretched(joints: Records, bones: Records, beyond: Bools, positions: Array) -> Bools:
+    """The less expected ends (J,) of the long bones that have not their usual length.
+
+    What hangs on them went along, unless the next bone too is stretched at this end.
+    """
+    near, far = np.zeros(len(joints), dtype=np.bool_), np.zeros(len(bones), dtype=np.bool_)
+    for index, bone in enumerate(bones):
+        if _changed(bone, distance(positions[bone.far], positions[bone.near])):
+            far[index] = _known(joints[bone.far].off) >= _known(joints[bone.near].off)
+            near[bone.near] |= not far[index]
+    out = near.copy()
+    for index, bone in enumerate(bones):
+        if far[index]:
+            out[bone.far] = True
+            if not near[bone.far]:
+                out |= beyond[index]
+    return out
+
+
+@kernel
+def _changed(bone: Record, length: float) -> bool:
+    """Whether a bone's length is not its usual one, which gives way.
+
+    So nobody needs to confirm what is rejected for it.
+    """
+    if not 0.0 < length < np.inf:
+        return False
+    usual = bone.usual if bone.measured > 0 else length
+    off = abs(np.log(length / usual)) > STRETCHED and abs(length - usual) > STRETCHED_BY
+    judged = off and bone.measured >= BONES_MEASURED
+    share = max(BONE_STEP, 1.0 / (bone.measured + 1.0)) * usual
+    bone.usual = usual + min(max(length - usual, -share), share)
+    bone.measured += 1
+    return judged
+
+
+@kernel
+def _known(off: float) -> float:
+    return 0.0 if np.isnan(off) else off
+
+
+@kernel
+def _believe(joints: Records, positions: Array, time: float) -> None:
+    """Remember where joints are and how they move."""
+    for index, joint in enumerate(joints):
+        place = positions[index]
+        if np.isnan(place[0]):
+            continue
+        gap = time - joint.at
+        if abs(gap) < FORGET:
+            joint.velocity[:] = (place - joint.place) / max(gap, VELOCITY_SECONDS)
+            joint.times += 1
+        else:
+            joint.velocity[:] = 0.0
+            joint.times = 1
+        joint.place[:] = place
+        joint.at = time

@@ -7,6 +7,8 @@ from numpy.typing import NDArray
 
 from devices.anatomy import Kind, Side, first_of, label_joints
 from devices.skeleton import Skeleton
+from solvers.compiled import kernel
+from solvers.continuity import distance
 
 Array = NDArray[np.float64]
 
@@ -65,18 +67,28 @@ class HeldPose:
         return self._told and not told
 
 
+@kernel
 def _struck(points: Array) -> bool:
     """Whether shoulders, elbows, hands (left, right), hips and head (8, 3) make a T or an A."""
-    shoulders, elbows, hands, (hips, head) = points.reshape(4, 2, 3)
-    arms, back, across = hands - shoulders, head - hips, shoulders[0] - shoulders[1]
-    reach = np.linalg.norm(arms, axis=1)
-    bones = np.linalg.norm(elbows - shoulders, axis=1) + np.linalg.norm(hands - elbows, axis=1)
-    height, width = float(np.linalg.norm(back)), float(np.hypot(across[0], across[2]))
-    if min(float(reach.min()), height, width) <= 0.0 or (reach < STRAIGHT * bones).any():
+    left, right, hips, head = points[0], points[1], points[6], points[7]
+    across_x, across_z = left[0] - right[0], left[2] - right[2]
+    width = np.hypot(across_x, across_z)
+    if width <= 0.0 or head[1] - hips[1] <= UPRIGHT * distance(hips, head):
         return False
-    rise = arms[:, 1] / reach
-    poses = [bool(((low <= rise) & (rise <= high)).all()) for low, high in (T_POSE, A_POSE)]
-    side = (arms[:, [0, 2]] @ across[[0, 2]]) * [1.0, -1.0] / width
-    level = np.maximum(np.hypot(arms[:, 0], arms[:, 2]), 1e-9)
-    out = bool((side > SIDEWAYS * level).all())
-    return any(poses) and out and abs(rise[0] - rise[1]) < ALIKE and back[1] > UPRIGHT * height
+    rise = np.zeros(2)
+    for side in range(2):
+        shoulder, elbow, hand = points[side], points[2 + side], points[4 + side]
+        reach = distance(shoulder, hand)
+        bones = distance(shoulder, elbow) + distance(elbow, hand)
+        if reach <= 0.0 or reach < STRAIGHT * bones:
+            return False
+        x, y, z = hand - shoulder
+        outward = (x * across_x + z * across_z) / width
+        level = max(np.hypot(x, z), 1e-9)
+        if (outward if side == 0 else -outward) <= SIDEWAYS * level:
+            return False
+        rise[side] = y / reach
+    low, high = rise.min(), rise.max()
+    t_pose = T_POSE[0] <= low and high <= T_POSE[1]
+    a_pose = A_POSE[0] <= low and high <= A_POSE[1]
+    return bool((t_pose or a_pose) and high - low < ALIKE)

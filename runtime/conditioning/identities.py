@@ -135,9 +135,12 @@ class Identities:
     ) -> None:
         gap = frame.time - track.frame.time
         if place is not None and track.place is not None and 0.0 < gap < CARRIED_ON:
-            new = tuple((a - b) / gap for a, b in zip(place, track.place, strict=True))
-            x, y, z = (0.5 * (a + b) for a, b in zip(new, track.velocity, strict=True))
-            track.velocity = x, y, z
+            (x, y, z), (u, v, w), (a, b, c) = place, track.velocity, track.place
+            track.velocity = (
+                0.5 * ((x - a) / gap + u),
+                0.5 * ((y - b) / gap + v),
+                0.5 * ((z - c) / gap + w),
+            )
         elif gap >= CARRIED_ON:
             track.velocity = 0.0, 0.0, 0.0
         track.place = track.place if place is None else place
@@ -180,8 +183,8 @@ def _captures(frames: Sequence[SkeletonFrame]) -> Iterator[list[SkeletonFrame]]:
 def _carried(track: _Track, gap: float) -> tuple[float, float, float]:
     assert track.place is not None
     step = min(max(gap, 0.0), CARRIED_ON)
-    x, y, z = (p + v * step for p, v in zip(track.place, track.velocity, strict=True))
-    return x, y, z
+    (x, y, z), (u, v, w) = track.place, track.velocity
+    return x + u * step, y + v * step, z + w * step
 
 
 def _reach(gap: float) -> float:

@@ -6,21 +6,37 @@ already (`devices.floor_level`); then there is little left to do here.
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
 from replay.orientation import upright
 from runtime.conditioning.body import Body
+from solvers.compiled import kernel
 from solvers.floor_plane import FloorFit
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+Records = NDArray[np.void]
 
 EVERY, LONGEST = 0.1, 0.5  # [s] between two looks at the feet
 STILL = 0.25  # [m/s] a foot that stands is slower
 LOWEST = 0.05  # [m] and no higher above the lowest foot
 JUMPED = 0.15  # [m] above the floor as known, where a foot is in the air
 KNOWN = 1.0  # [s] of standing after which the floor is known
+
+# Of each foot: its joint and how high that is when one stands; where it was at the last look, and
+# whether it has stood still since the one before.
+_FOOT = np.dtype(
+    [
+        ("joint", np.int64),
+        ("rest", np.float64),
+        ("place", np.float64, 3),
+        ("still", np.bool_),
+    ],
+    align=True,
+)
 
 
 class Levelling:
@@ -31,10 +47,10 @@ class Levelling:
     """
 
     def __init__(self, body: Body) -> None:
-        self._body = body
+        self._feet = np.zeros(len(body.feet), _FOOT)
+        self._feet["joint"], self._feet["rest"] = body.feet, body.feet_rest
         self._fit = FloorFit()
-        self._feet: Array | None = None
-        self._at = 0.0
+        self._at = float("nan")
         self._turn, self._rise = np.eye(3), 0.0
 
     def forget(self) -> None:
@@ -43,34 +59,53 @@ class Levelling:
 
     def watch(self, positions: Array, filled: Bools, time: float) -> None:
         """Learn from where the feet are: (J, 3) [m], and (J,) which of them are guesses."""
-        feet = self._body.feet
-        if not len(feet):
+        elapsed = time - self._at
+        if 0.0 <= elapsed < EVERY or not len(self._feet):
             return
-        before, elapsed = self._feet, time - self._at
-        if before is not None and 0.0 <= elapsed < EVERY:
-            return
-        self._feet, self._at = positions[feet], time
-        if before is None or not 0.0 < elapsed < LONGEST:
-            return
-        move = self._feet - before
-        still = np.einsum("ij,ij->i", move, move) < (STILL * elapsed) ** 2
-        soles = self._feet - self._body.feet_rest[:, None] * [0.0, 1.0, 0.0]
-        stands = still & ~filled[feet] & (soles[:, 1] < soles[:, 1].min() + LOWEST)
+        self._at = time
+        reach = STILL * elapsed if 0.0 < elapsed < LONGEST else 0.0
+        soles = _standing(self._feet, positions, filled, reach)
         if self._fit.weight > KNOWN:
-            stands &= (soles @ self._turn.T)[:, 1] + self._rise < JUMPED
-        if stands.any():
-            self._fit.add(soles[stands], elapsed)
+            soles = soles[self.level(soles)[:, 1] < JUMPED]
+        if len(soles):
+            self._fit.add(soles, elapsed)
             self._hold(*self._fit.plane())
 
     def level(self, positions: Array) -> Array:
         """Positions (J, 3) [m] with the floor at y = 0."""
-        out: Array = positions @ self._turn.T
-        out[:, 1] += self._rise
-        return out
+        return _levelled(positions, self._turn, self._rise)
 
     def _hold(self, a: float, b: float, height: float) -> None:
         """Bring y = a x + b z + height to y = 0, turning about the origin."""
-        normal = np.array([-a, 1.0, -b])
-        normal /= np.linalg.norm(normal)
-        self._turn = upright(normal)
-        self._rise = -height * float(normal[1])
+        upward = 1.0 / math.sqrt(1.0 + a * a + b * b)
+        self._turn = upright(np.array([-a, 1.0, -b]) * upward)
+        self._rise = -height * upward
+
+
+@kernel
+def _standing(feet: Records, positions: Array, filled: Bools, reach: float) -> Array:
+    """Where soles (n, 3) [m] are that moved by less than `reach` [m] and are not in the air."""
+    soles = np.empty((len(feet), 3))
+    for index, foot in enumerate(feet):
+        place = positions[foot.joint]
+        foot.still = ((place - foot.place) ** 2).sum() < reach**2 and not filled[foot.joint]
+        foot.place[:] = soles[index] = place
+        soles[index, 1] -= foot.rest
+    lowest = soles[:, 1].min()
+    count = 0
+    for index, foot in enumerate(feet):
+        if foot.still and soles[index, 1] < lowest + LOWEST:
+            soles[count] = soles[index]
+            count += 1
+    return soles[:count]
+
+
+@kernel
+def _levelled(points: Array, turn: Array, rise: float) -> Array:
+    out = np.empty_like(points)
+    for index in range(len(points)):
+        x, y, z = points[index]
+        for axis in range(3):
+            out[index, axis] = turn[axis, 0] * x + turn[axis, 1] * y + turn[axis, 2] * z
+        out[index, 1] += rise
+    return out

@@ -5,12 +5,27 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from solvers.compiled import kernel
+
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+Records = NDArray[np.void]
 
 SECONDS = 0.15
 FORGET = 0.5  # [s] without a frame after which nobody remembers where joints were shown
 NEARLY = 0.02  # [m] that nobody sees as a jump
+
+# Of each joint: when it was seen again, and how far from there it was shown then. In the frame
+# before: where it was shown, and whether that was a guess.
+_JOINT = np.dtype(
+    [
+        ("since", np.float64),
+        ("off", np.float64, 3),
+        ("shown", np.float64, 3),
+        ("filled", np.bool_),
+    ],
+    align=True,
+)
 
 
 class Rejoining:
@@ -21,16 +36,13 @@ class Rejoining:
     """
 
     def __init__(self, joints: int) -> None:
-        self._off = np.zeros((joints, 3))  # [m] from where it is seen, when it was seen again
-        self._since = np.full(joints, -np.inf)
-        self._shown: Array | None = None
-        self._at = 0.0
-        self._filled = np.zeros(joints, dtype=bool)
+        self._joints = np.zeros(joints, _JOINT)
+        self.forget()
 
     def forget(self) -> None:
         """Show whatever comes next where it is."""
-        self._shown = None
-        self._since[:] = -np.inf
+        self._at = float("nan")
+        self._joints["since"] = -np.inf
 
     def lead(self, positions: Array, filled: Bools, time: float) -> tuple[Array, Bools]:
         """Where joints (J, 3) [m] are shown, and which (J,) of them are on their way.
@@ -40,16 +52,26 @@ class Rejoining:
             filled: (J,) which of them are guesses.
             time: [s].
         """
-        if self._shown is not None and abs(time - self._at) < FORGET:
-            again = self._filled & ~filled
-            if again.any():
-                self._off[again] = self._shown[again] - positions[again]
-                far = np.einsum("ij,ij->i", self._off, self._off) > NEARLY**2
-                self._since[again] = np.where(far[again], time, -np.inf)
-        passed = (time - self._since) / SECONDS
-        on_the_way = (passed >= 0.0) & (passed < 1.0) & ~filled
-        if on_the_way.any():
-            left = 1.0 - np.where(on_the_way, passed, 1.0)
-            positions = positions + self._off * (left * left * (3.0 - 2.0 * left))[:, None]
-        self._shown, self._filled, self._at = positions, filled, time
-        return positions, on_the_way
+        shown, on_the_way = positions.copy(), np.zeros(len(positions), dtype=np.bool_)
+        if not abs(time - self._at) < FORGET:
+            self._joints["filled"] = False
+        _lead(self._joints, shown, filled, on_the_way, time)
+        self._at = time
+        return shown, on_the_way
+
+
+@kernel
+def _lead(joints: Records, positions: Array, filled: Bools, on_the_way: Bools, time: float) -> None:
+    for index, joint in enumerate(joints):
+        place = positions[index]
+        if joint.filled and not filled[index]:
+            joint.off[:] = joint.shown - place
+            far = (joint.off**2).sum() > NEARLY**2
+            joint.since = time if far else -np.inf
+        passed = (time - joint.since) / SECONDS
+        if 0.0 <= passed < 1.0 and not filled[index]:
+            left = 1.0 - passed
+            place += joint.off * (left * left * (3.0 - 2.0 * left))
+            on_the_way[index] = True
+        joint.shown[:] = place
+        joint.filled = filled[index]

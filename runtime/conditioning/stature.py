@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import math
+from statistics import median
+
 import numpy as np
 from numpy.typing import NDArray
 
 from devices.skeleton import Skeleton
+from solvers.compiled import kernel
+from solvers.continuity import distance
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
+Indices = NDArray[np.int64]
 
 SECONDS = 1.0  # [s] that are measured; after them nobody grows
 LEAST_BONE = 0.05  # [m] at rest; shorter ones are mostly noise
@@ -37,21 +43,32 @@ class Stature:
     def forget(self) -> None:
         """Measure anew."""
         self.factor = 1.0
-        self._ratios: list[float] = []
+        self._sizes: list[float] = []
         self._until = float("nan")
 
     def watch(self, positions: Array, filled: Bools, time: float) -> None:
         """Measure positions (J, 3) [m], `filled` (J,) being guesses, for the first second."""
         if time > self._until:
             return
-        both = ~(filled[self._far] | filled[self._near])
-        if not both.any():
+        size = _size(positions, filled, self._far, self._near, self._rest)
+        if math.isnan(size):
             return
-        if np.isnan(self._until):
+        if math.isnan(self._until):
             self._until = time + SECONDS
-        ends = positions[self._far[both]] - positions[self._near[both]]
-        self._ratios.append(float(np.median(np.linalg.norm(ends, axis=1) / self._rest[both])))
-        ratio = float(np.median(self._ratios))
+        self._sizes.append(size)
+        size = median(self._sizes)
         self.factor = 1.0
-        if abs(ratio - 1.0) > SAME:
-            self.factor = 1.0 / float(np.clip(ratio, 1.0 / MOST, MOST))
+        if abs(size - 1.0) > SAME:
+            self.factor = 1.0 / min(max(size, 1.0 / MOST), MOST)
+
+
+@kernel
+def _size(positions: Array, filled: Bools, far: Indices, near: Indices, rest: Array) -> float:
+    """How many times as long as at rest the bones are in the middle; NaN where none was seen."""
+    ratios = np.empty(len(rest))
+    seen = 0
+    for bone, length in enumerate(rest):
+        if not (filled[far[bone]] or filled[near[bone]]):
+            ratios[seen] = distance(positions[far[bone]], positions[near[bone]]) / length
+            seen += 1
+    return float(np.median(ratios[:seen])) if seen > 0 else np.nan

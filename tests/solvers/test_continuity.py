@@ -3,7 +3,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solvers.continuity import DAMPING, FURTHEST_STEP, exchanged, expected
+from solvers.continuity import DAMPING, FURTHEST_STEP, exchanged, expect
 
 # Two hands, two feet and a head.
 PARTNER = np.array([1, 0, 3, 2, 4])
@@ -13,16 +13,24 @@ STANDING = np.array(
 )
 
 
+def expected(last: np.ndarray, velocity: np.ndarray, gap: float) -> np.ndarray:
+    wanted = np.empty(3)
+    expect(last, velocity, gap, wanted)
+    return wanted
+
+
 def test_a_motion_goes_on_damped() -> None:
-    last, velocity = np.zeros((2, 3)), np.array([[1.0, 0.0, 0.0], [0.0, -2.0, 0.0]])
-    np.testing.assert_allclose(
-        expected(last, velocity, np.array([0.1, 0.05])), DAMPING * 0.1 * np.sign(velocity)
-    )
+    last, velocity = np.array([0.5, 0.0, 0.0]), np.array([1.0, -2.0, 0.0])
+    for gap in (0.1, -0.1):
+        np.testing.assert_allclose(
+            expected(last, velocity, gap), last + DAMPING * gap * velocity, rtol=1e-12
+        )
 
 
 def test_nothing_is_expected_far_away() -> None:
-    far = expected(np.zeros((1, 3)), np.array([[3.0, 4.0, 0.0]]) * 1e3, np.array([1.0]))
-    np.testing.assert_allclose(far, [[0.6 * FURTHEST_STEP, 0.8 * FURTHEST_STEP, 0.0]])
+    for sign in (1.0, -1.0):
+        far = expected(np.zeros(3), np.array([3.0, 4.0, 0.0]) * 1e3, sign)
+        np.testing.assert_allclose(far, sign * FURTHEST_STEP * np.array([0.6, 0.8, 0.0]))
 
 
 @pytest.mark.parametrize("groups", [(0,), (1,), (0, 1), ()])
@@ -39,7 +47,15 @@ def test_limbs_that_are_together_or_unseen_are_left_alone() -> None:
     hidden = STANDING[PARTNER].copy()
     hidden[[0, 2]] = np.nan
     assert not exchanged(hidden, STANDING, PARTNER, GROUP).any()
+    assert not exchanged(STANDING[PARTNER], hidden[PARTNER], PARTNER, GROUP).any()
     assert not exchanged(STANDING[PARTNER], np.full((5, 3), np.nan), PARTNER, GROUP).any()
+
+
+def test_what_is_unseen_of_a_limb_does_not_hide_the_exchange_of_the_rest() -> None:
+    group = np.array([0, 0, 0, 0, -1])
+    seen = STANDING[PARTNER].copy()
+    seen[0] = np.nan
+    assert exchanged(seen, STANDING, PARTNER, group).all()
 
 
 def test_a_limb_that_moves_is_not_exchanged() -> None:
