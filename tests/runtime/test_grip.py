@@ -29,7 +29,9 @@ def test_what_is_seen_is_held_firmly():
 def test_a_flicker_changes_nothing():
     grip = Grip(1)
     held(grip, [True], 0.5, 0.0)
-    assert all((w == HARD).all() for w in held(grip, [False], 0.9 * PATIENCE, 0.5))
+    for start in (0.5, 1.0, 1.5):  # however often
+        assert all((w == HARD).all() for w in held(grip, [False], 0.9 * PATIENCE, start))
+        held(grip, [True], 0.25, start + 0.25)
 
 
 def test_a_lost_limb_lets_go_step_by_step_and_takes_hold_faster():

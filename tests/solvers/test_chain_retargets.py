@@ -25,9 +25,12 @@ def maps() -> list[ChainMap]:
 
 
 def poses(count: int) -> np.ndarray:
-    """A body that goes from its rest to somewhere else."""
+    """A body that turns from its rest, 40 degrees a frame, and bends a little."""
     away = np.random.default_rng(4).normal(size=REST.shape)
-    return np.array([REST + 0.2 * k * away for k in range(count)])
+    axis = np.cross(REST[1] - REST[0], [1.0, 0.0, 0.0])  # the first bone comes to lie opposed
+    angles = np.radians(40.0) * np.arange(count)[:, None]
+    turns = Rotation.from_rotvec(angles * axis / np.linalg.norm(axis))
+    return np.array([turn.apply(REST + 0.02 * k * away) for k, turn in enumerate(turns)])
 
 
 def alone(positions: np.ndarray) -> np.ndarray:
@@ -50,10 +53,10 @@ def test_each_chain_does_what_it_would_do_alone_frame_after_frame() -> None:
     moving, together = poses(6), ChainRetargets(maps(), SOURCES)
     for pose, expected in zip(moving, alone(moving), strict=True):
         np.testing.assert_allclose(together.rotations(pose, FULL), expected, atol=1e-14)
+    fresh = alone(moving[-1:])[0]
+    assert np.abs(fresh - expected).max() > 0.1, "what came before makes a difference"
     together.reset()
-    np.testing.assert_allclose(
-        together.rotations(moving[-1], FULL), alone(moving[-1:])[0], atol=1e-14
-    )
+    np.testing.assert_allclose(together.rotations(moving[-1], FULL), fresh, atol=1e-14)
 
 
 def test_a_gain_makes_the_turns_of_its_own_chain_smaller() -> None:

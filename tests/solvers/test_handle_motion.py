@@ -65,12 +65,12 @@ def test_half_a_turn_blends_to_a_quarter_without_collapse():
 
 def test_the_farthest_motion_is_that_of_the_points_that_a_group_has():
     turn = Rotation.from_rotvec([0.0, 0.0, 0.5])
-    source = np.array([[1.0, 0, 0], [0, 1, 0], [0, 0, 1], [4, 0, 0], [5, 1, 0], [4, 1, 3]])
-    target = np.vstack([turn.apply(source[:3]), source[3:] + np.array([0.0, 0.0, 0.2])])
+    source = np.array([[4.0, 0, 0], [5, 1, 0], [4, 1, 3], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    target = np.vstack([source[:3] + np.array([0.0, 0.0, 0.2]), turn.apply(source[3:])])
     group_of = np.repeat([0, 1], 3)
     motions = fit_motions(source, target, group_of, 2)
     angle, path = farthest_motion(motions, source, group_of)
     assert angle == pytest.approx(0.5)
     assert path == pytest.approx(2.0 * np.sin(0.25))
-    group_of[:3] = -1  # nobody's
+    group_of[3:] = -1  # nobody's
     assert farthest_motion(motions, source, group_of)[1] == pytest.approx(0.2)
