@@ -167,10 +167,11 @@ def move_along(
     Source: Kavan et al. 2007, Skinning with dual quaternions, algorithm 1.
     """
     for i in prange(len(groups)):
-        pivot = groups[i, 0]
-        p0, p1, p2, p3 = motions[pivot, 0], motions[pivot, 1], motions[pivot, 2], motions[pivot, 3]
-        w = a = b = c = dw = da = db = dc = 0.0
-        for k in range(KEPT):
+        g, m = groups[i, 0], weights[i, 0]
+        p0, p1, p2, p3 = motions[g, 0], motions[g, 1], motions[g, 2], motions[g, 3]
+        w, a, b, c = m * p0, m * p1, m * p2, m * p3
+        dw, da, db, dc = m * motions[g, 4], m * motions[g, 5], m * motions[g, 6], m * motions[g, 7]
+        for k in range(1, KEPT):
             g = groups[i, k]
             q0, q1, q2, q3 = motions[g, 0], motions[g, 1], motions[g, 2], motions[g, 3]
             # Of a rotation's two quaternions, the one on the first one's side.
