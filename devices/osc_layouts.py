@@ -16,9 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.compiled import kernel
-from devices.osc import BUNDLE
+from devices.osc import BUNDLE, Message, numbers_at_end
 
 Bytes = NDArray[np.uint8]
+Span = tuple[int, int]
 Plan = TypeVar("Plan")
 
 MOST_LENGTHS = 16
@@ -52,19 +53,19 @@ class Layouts(Generic[Plan]):
                 return layout.plan
         return None
 
-    def learn(self, data: bytes, numbers: Iterable[slice], plan: Plan) -> None:
-        """Remember what to make of a packet, whatever the `numbers` in it are.
+    def learn(self, data: bytes, said: Iterable[tuple[Span, Message]], plan: Plan) -> None:
+        """Remember what to make of a packet, whatever the numbers at the ends of its messages are.
 
         Args:
-            data: a packet that is well-formed.
-            numbers: where they are; nothing but arguments of messages.
+            data: a packet that was read and is well-formed.
+            said: its messages, and where each begins and ends.
             plan: what `find` is to return; the same for any numbers.
         """
         mask = np.full(len(data), 255, dtype=np.uint8)
         if data.startswith(BUNDLE):
             mask[_TIME_TAG] = 0
-        for place in numbers:
-            mask[place] = 0
+        for (_, end), message in said:
+            mask[end - numbers_at_end(message.tags) : end] = 0
         there = np.frombuffer(data, np.uint8)
         layout = _Layout(mask, there & mask, plan)
         _same(there, mask, layout.pattern)  # compiled now, and not when the next packet comes

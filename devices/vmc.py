@@ -26,8 +26,8 @@ from devices.humanoid_kernels import FARTHEST, read_bones
 from devices.humanoid_pose import COUNT, SKELETON, HumanoidPose
 from devices.joint_names import Kind, Side, part_of_name
 from devices.live_stream import LiveStream
-from devices.osc import Message, OscError, elements, numbers_at_end, read_message
-from devices.osc_layouts import Layouts
+from devices.osc import Message, OscError, elements, read_message
+from devices.osc_layouts import Layouts, Span
 from devices.skeleton import SkeletonFrame
 from devices.udp import UdpTransport
 from devices.unity_space import across_unity, turn_across_unity
@@ -59,7 +59,6 @@ _TRACKED = {
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
-Span = tuple[int, int]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -173,14 +172,11 @@ class VmcDecoder:
         plan = self.layouts.find(data)
         if plan is not None:
             return [one if isinstance(one, Run) else read_message(data, *one) for one in plan]
-        spans, messages = [], []
-        for span in elements(data):
-            spans.append(span)
-            messages.append(read_message(data, *span))
-        plan = tuple(_planned(spans, messages))
+        said = [(span, read_message(data, *span)) for span in elements(data)]
+        plan = tuple(_planned(said))
         if any(isinstance(one, Run) for one in plan):
-            self.layouts.learn(data, _numbers(spans, messages), plan)
-        return messages
+            self.layouts.learn(data, said, plan)
+        return [message for _, message in said]
 
     def _late(self, items: Sequence[Message | Run], arrival: float) -> bool:
         """Whether a datagram was overtaken by a newer one, just now."""
@@ -388,10 +384,10 @@ def _bone_called(name: str) -> int | None:
     return _BONES_ANY_CASE.get(name.lower()) if joint is None else joint
 
 
-def _planned(spans: Sequence[Span], messages: Sequence[Message]) -> Iterator[Run | Span]:
+def _planned(said: Sequence[tuple[Span, Message]]) -> Iterator[Run | Span]:
     """Runs of bones, as long as there are some, and the other messages by themselves."""
     run: dict[int, Span] = {}
-    for span, message in zip(spans, messages, strict=True):
+    for span, message in said:
         joint = None
         if message.address == _BONE and message.tags == _POSE:
             joint = _bone_called(str(message.arguments[0]))
@@ -412,11 +408,6 @@ def _as_run(bones: Mapping[int, Span]) -> Iterator[Run | Span]:
     joints = np.array(list(bones), dtype=np.int64)
     places = np.array([end - _POSE_BYTES for _, end in bones.values()], dtype=np.int64)
     yield Run(joints, places, frozenset(bones), tuple(bones.values()))
-
-
-def _numbers(spans: Sequence[Span], messages: Sequence[Message]) -> Iterator[slice]:
-    for (_, end), message in zip(spans, messages, strict=True):
-        yield slice(end - numbers_at_end(message.tags), end)
 
 
 def _checked(numbers: Sequence[float]) -> tuple[Array, Array] | None:
