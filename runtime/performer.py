@@ -17,7 +17,7 @@ from devices.anatomy import (
 )
 from devices.joint_names import Kind
 from devices.skeleton import Skeleton, SkeletonFrame
-from runtime.conditioning.conditioner import Conditioner
+from runtime.conditioning.conditioner import Conditioner, warm
 from runtime.conditioning.mirror import mirrored
 from runtime.conditioning.switches import Conditioning, filled_only
 from solvers.heading import heading, turned
@@ -125,6 +125,8 @@ class Performer:
         self._sole = float(np.clip(skeleton.rest_positions[:, 1].min(), 0.0, HIGHEST_SOLE))
         self._heading = 0.0
         self.pose: Pose | None = None
+        warm(skeleton)
+        heading(skeleton.rest_positions.copy(), self._pairs)
 
     def follow(self, frame: SkeletonFrame) -> Pose:
         """Take in one frame; its pose is the newest."""

@@ -66,6 +66,7 @@ def exchanged(seen: Array, wanted: Array, partner: Indices, group: Indices) -> B
     count = np.zeros(groups)
     for point, of in enumerate(group):
         other = partner[point]
+        # Not isfinite of a sum: x - x in it may be reordered until a NaN is lost.
         off = distance(seen[point], wanted[point])
         if of < 0 or np.isnan(off) or np.isnan(distance(seen[other], wanted[other])):
             continue

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from runtime.conditioning.levelling import Levelling
 from runtime.conditioning.mirror import mirrored
 from runtime.conditioning.rejoining import Rejoining
 from runtime.conditioning.stature import Stature
-from runtime.conditioning.switches import Conditioning
+from runtime.conditioning.switches import SWITCHES, Conditioning
 from solvers.one_euro import OneEuroFilter
 from solvers.prediction import Predictor
 
@@ -166,3 +167,13 @@ class Conditioner:
             positions = positions if scale == 1.0 else positions * scale
         self.held = on.recalibrate and memory.held.watch(positions, filled, time)
         return positions, scale
+
+
+@lru_cache(maxsize=1)
+def warm(skeleton: Skeleton) -> None:
+    """Take every step once, so that no frame of a show waits for one to be compiled or loaded."""
+    conditioner = Conditioner(skeleton, Conditioning(**dict.fromkeys(SWITCHES, True)))
+    rest, seen = skeleton.rest_positions, np.ones(len(skeleton.names))
+    for time in (0.0, 0.2):  # two looks at the feet
+        conditioner.condition(SkeletonFrame(time, rest, None, seen))
+    conditioner.condition(SkeletonFrame(0.4, np.full_like(rest, np.nan), None, 0.0 * seen))

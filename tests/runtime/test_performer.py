@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -150,3 +153,43 @@ def test_an_unknown_source_is_told_in_one_line(source: str) -> None:
     with pytest.raises(InputError, match="--source") as told:
         Performer(BODY, source)
     assert "\n" not in str(told.value)
+
+
+def test_no_frame_of_a_show_waits_for_a_compiler() -> None:
+    # In an interpreter of its own, where no other test has called what is compiled.
+    show = """
+import gc
+import numpy as np
+from numba.core.dispatcher import Dispatcher
+from replay.builtin import builtin_recording
+from runtime.conditioning.switches import SWITCHES, Conditioning
+from runtime.performer import Performer
+
+def ready():
+    found = (each for each in gc.get_objects() if isinstance(each, Dispatcher))
+    return {each.py_func.__qualname__: each.signatures for each in found if each.signatures}
+
+recording = builtin_recording("show")
+switches = Conditioning(*[True] * len(SWITCHES))
+performer = Performer(recording.skeleton, conditioning=switches)
+before = ready()
+for index in range(200):
+    frame = recording.frame(index)
+    positions = frame.positions.copy()
+    positions[index % 7 : index % 11] = np.nan
+    positions[index % 50] += index % 3
+    performer.follow(type(frame)(frame.time, positions, None, frame.confidence))
+    if index % 40 == 20:
+        switches.switch(SWITCHES[2 + index // 40])
+assert len(before) > 10, before
+assert ready() == before, ready().keys() - before.keys()
+assert max(map(len, before.values())) == 1, before
+"""
+    run = subprocess.run(
+        [sys.executable, "-c", show],
+        cwd=Path(__file__).resolve().parents[2],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert run.returncode == 0, run.stderr
