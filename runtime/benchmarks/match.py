@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.abstraction import simplify
+from solvers.chain_retargets import ChainRetargets
 from solvers.matching import SIZE_PREFERENCE, Match, TargetHierarchy
-from solvers.polyline_motion import ChainRetarget
+from solvers.polyline_motion import map_chain
 from solvers.skeleton_pose import SkeletonPose
 from solvers.tree import Tree
 
@@ -69,17 +70,15 @@ def _measure(hierarchy: TargetHierarchy, rest: Tree) -> Figures:
 
 def _driver(target: Tree, rest: Tree, match: Match) -> Callable[[NDArray[np.float64]], object]:
     """What a frame costs once a match is chosen: rotations of all chains, then all nodes."""
-    skeleton = SkeletonPose(target, match.root, [chain for _, chain in match.pairs])
-    chains = [
-        (
-            list(source),
-            ChainRetarget(
-                rest.positions[list(source)], target.positions[list(driven)], _VIEW, _VIEW
-            ),
-        )
-        for source, driven in match.pairs
+    sources = [list(source) for source, _ in match.pairs]
+    driven = [list(chain) for _, chain in match.pairs]
+    maps = [
+        map_chain(rest.positions[joints], target.positions[nodes], _VIEW, _VIEW)
+        for joints, nodes in zip(sources, driven, strict=True)
     ]
-    return lambda pose: skeleton.pose([chain.rotations(pose[nodes]) for nodes, chain in chains])
+    skeleton, chains = SkeletonPose(target, match.root, driven), ChainRetargets(maps, sources)
+    gains = np.ones(len(maps))
+    return lambda pose: skeleton.place(chains.rotations(pose, gains))
 
 
 def _times(
