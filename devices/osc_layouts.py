@@ -41,6 +41,8 @@ class Layouts(Generic[Plan]):
 
     def __init__(self) -> None:
         self._by_length: dict[int, deque[_Layout[Plan]]] = {}
+        nothing = np.zeros(0, dtype=np.uint8)
+        _same(np.frombuffer(b"", np.uint8), nothing, nothing)  # compiled before the first packet
 
     def find(self, data: bytes) -> Plan | None:
         """What was learned of a packet that differs in its numbers only; None if there is none."""
@@ -68,7 +70,6 @@ class Layouts(Generic[Plan]):
             mask[end - numbers_at_end(message.tags) : end] = 0
         there = np.frombuffer(data, np.uint8)
         layout = _Layout(mask, there & mask, plan)
-        _same(there, mask, layout.pattern)  # compiled now, and not when the next packet comes
         if len(data) not in self._by_length and len(self._by_length) == MOST_LENGTHS:
             del self._by_length[next(iter(self._by_length))]
         self._by_length.setdefault(len(data), deque(maxlen=MOST_A_LENGTH)).append(layout)

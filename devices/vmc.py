@@ -125,6 +125,10 @@ class VmcDecoder:
         self._frames: list[SkeletonFrame] = []
         self._closing = self._has_parts = self._rooted = False
         self._handlers = self._of_role(role)
+        nobody = np.zeros(0, dtype=np.int64)
+        self._read_run(
+            Run(nobody, nobody, frozenset(), ()), b""
+        )  # compiled before the first packet
 
     def _of_role(self, role: str) -> dict[str, Callable[[Message, float], bool]]:
         handlers: dict[str, Callable[[Message, float], bool]] = {
@@ -199,16 +203,17 @@ class VmcDecoder:
     def _take_run(self, run: Run, data: bytes, arrival: float) -> None:
         """Take many bones at once; one by one where one is refused or begins another frame."""
         bones = self._pose.bones
-        packet = np.frombuffer(data, np.uint8)
-        if self._assembly.parts.isdisjoint(run.parts) and read_bones(
-            packet, run.places, run.joints, bones.positions, bones.rotations
-        ):
+        if self._assembly.parts.isdisjoint(run.parts) and self._read_run(run, data):
             bones.sent[run.joints] = bones.fresh[run.joints] = True
             self._assembly.add_all(run.parts, arrival)
             self._has_parts = True
             return
         for span in run.spans:
             self._take(read_message(data, *span), arrival)
+
+    def _read_run(self, run: Run, data: bytes) -> bool:
+        packet, bones = np.frombuffer(data, np.uint8), self._pose.bones
+        return read_bones(packet, run.places, run.joints, bones.positions, bones.rotations)
 
     # What each message does; False where it is refused.
 

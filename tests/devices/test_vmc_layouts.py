@@ -9,6 +9,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from devices.humanoid_kernels import pose_in_world, read_bones
 from devices.osc import BUNDLE, elements, read_packet
 from devices.skeleton import SkeletonFrame
 from devices.vmc import MARIONETTE, PERFORMER, VmcDecoder
@@ -108,3 +109,16 @@ def test_a_malformed_packet_of_a_known_length_is_refused() -> None:
     decoder.feed(data, 100.0)
     assert decoder.feed(BUNDLE + bytes(8) + b"\xff" * (len(data) - 16), 100.1) == ()
     assert decoder.refused == 1
+
+
+def test_no_packet_waits_for_the_compiler() -> None:
+    """Each kernel is compiled once, when a decoder is made, for whatever comes to it later."""
+    kernels = (read_bones, pose_in_world)
+    body, tracked = VmcDecoder(tpose=0.02), VmcDecoder(PERFORMER)
+    compiled = [len(kernel.signatures) for kernel in kernels]
+    assert compiled == [1, 1]
+    for k in range(6):
+        body.feed(slime(k / 60), 100.0 + k / 60)
+        body.feed(bundle(bones()[5:20]), 101.0 + k / 60)
+        tracked.feed(bundle([message("/VMC/Ext/Hmd/Pos", "", *POSE), *bones()[30:40]]), k / 60)
+    assert [len(kernel.signatures) for kernel in kernels] == compiled
