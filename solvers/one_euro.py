@@ -82,10 +82,15 @@ class OneEuroFilter:
         Args:
             points: (n, 3) [m], finite; n may not change between samples.
             dt: [s] since the sample before; a sample that took no time changes nothing.
+
+        Raises:
+            ValueError: there are not as many points as before.
         """
         if self._points is None:
             self._points = np.zeros(len(points), _POINT)
             self._points["raw"] = self._points["smooth"] = points
+        elif points.shape != (len(self._points), 3):
+            raise ValueError(f"Expected points {(len(self._points), 3)}, got {points.shape}")
         elif dt > NO_TIME:
             cutoffs = self.min_cutoff, self.speed_coefficient, self.derivative_cutoff
             _smooth(self._points, points, dt, cutoffs)

@@ -36,9 +36,14 @@ class Predictor:
         Args:
             points: (n, 3) [m], finite.
             dt: [s] since the sample before, which the next is expected to take too.
+
+        Raises:
+            ValueError: there are not as many points as before.
         """
         if self._before is None or self._velocity is None:
             self._before, self._velocity = points.copy(), np.zeros_like(points)
+        elif points.shape != self._before.shape:
+            raise ValueError(f"Expected points {self._before.shape}, got {points.shape}")
         elif dt > NO_TIME:
             self._step = min(dt, MOST)
             _follow(points, self._before, self._velocity, dt)

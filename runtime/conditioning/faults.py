@@ -112,7 +112,12 @@ class Faults:
             time: [s].
             swaps: put exchanged limbs right.
             outliers: reject what cannot be.
+
+        Raises:
+            ValueError: it has not the skeleton's number of joints.
         """
+        if positions.shape != (len(self._joints), 3):
+            raise ValueError(f"Expected positions {(len(self._joints), 3)}, got {positions.shape}")
         joints, mended = self._joints, positions.copy()
         wrong = _expect(joints, mended, time)
         if swaps and len(self._limbs):

@@ -281,6 +281,14 @@ def test_nothing_that_leaves_is_nan(
         assert np.isfinite(out.positions).all()
 
 
+@pytest.mark.parametrize("switches", [for_live(), for_recording(), ONLY()])
+def test_a_frame_of_another_skeleton_is_refused(switches: Conditioning) -> None:
+    for count in (len(BODY.names) - 1, len(BODY.names) + 1):
+        other = SkeletonFrame(0.0, np.zeros((count, 3)), None, np.ones(count))
+        with pytest.raises(ValueError, match=rf"got \({count}, 3\)"):
+            Conditioner(BODY, switches).condition(other)
+
+
 @settings(max_examples=40, deadline=None)
 @given(arrays(np.float64, (len(BODY.names), 3), elements=st.floats(-5.0, 5.0)))
 def test_the_mirror_twice_is_as_before(positions: np.ndarray) -> None:

@@ -77,3 +77,11 @@ def test_after_a_reset_the_first_sample_comes_out_as_it_is() -> None:
     run(euro, np.random.default_rng(3).normal(size=(5, 2, 3)), 1 / 60)
     euro.reset()
     np.testing.assert_array_equal(euro.filter(np.ones((2, 3)), 1 / 60), np.ones((2, 3)))
+
+
+def test_other_points_than_before_are_refused() -> None:
+    euro = OneEuroFilter()
+    euro.filter(np.ones((3, 3)), 1 / 60)
+    for count in (2, 4):
+        with pytest.raises(ValueError, match=rf"\(3, 3\), got \({count}, 3\)"):
+            euro.filter(np.ones((count, 3)), 1 / 60)

@@ -27,3 +27,11 @@ def test_a_sample_that_took_no_time_tells_no_velocity() -> None:
     np.testing.assert_array_equal(predictor.predict(np.ones((1, 3)), 0.0), np.ones((1, 3)))
     predictor.reset()
     np.testing.assert_array_equal(predictor.predict(np.ones((1, 3)), 1 / 60), np.ones((1, 3)))
+
+
+def test_other_points_than_before_are_refused() -> None:
+    predictor = Predictor()
+    predictor.predict(np.ones((3, 3)), 1 / 60)
+    for count in (2, 4):
+        with pytest.raises(ValueError, match=rf"\(3, 3\), got \({count}, 3\)"):
+            predictor.predict(np.ones((count, 3)), 1 / 60)
