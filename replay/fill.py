@@ -177,8 +177,13 @@ def _guess(joints: Records, scale: float, time: float, hold: float, ease: float)
     """Tell where each joint stands from its parent if it is not seen now."""
     for joint in joints:
         age = time - joint.seen_at - hold
-        w = min(age / ease, 1.0) if age > 0.0 else 0.0
-        turn(joint.offset, joint.rest * scale, w * w * (3.0 - 2.0 * w), joint.guess)
+        if age <= 0.0:
+            joint.guess[:] = joint.offset
+        elif age >= ease:
+            joint.guess[:] = joint.rest * scale
+        else:
+            w = age / ease
+            turn(joint.offset, joint.rest * scale, w * w * (3.0 - 2.0 * w), joint.guess)
 
 
 @_kernel
