@@ -15,8 +15,10 @@ from solvers.arap_cells import Cells, Terms
 from solvers.compiled import kernel, parallel_kernel
 from solvers.laplacian import Floats, Ints
 from solvers.rotation_fit import LANES, fit_rotations
+from solvers.vectors import lane, load, load_row, repeat_three, zeros
 
 _R = 9 * LANES
+_ENTRIES = np.uint64(9)  # of a rotation
 
 
 @kernel
@@ -30,29 +32,25 @@ def covariances(  # noqa: PLR0917
     starts, neighbours, fits = cells.starts, cells.neighbours, cells.fits
     for k in range(size):
         i = np.uint64(first + k)
-        x0, x1, x2 = x[i, 0], x[i, 1], x[i, 2]
-        s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = s8 = 0.0
-        l0 = l1 = l2 = 0.0
+        here = load_row(x, i)
+        column0, column1, column2 = zeros(x, 4), zeros(x, 4), zeros(x, 4)
+        image = zeros(x, 4)
         for h in range(np.uint64(starts[i]), np.uint64(starts[i + np.uint64(1)])):
-            j = np.uint64(neighbours[h])
-            d0, d1, d2 = x[j, 0] - x0, x[j, 1] - x1, x[j, 2] - x2
-            u0, u1, u2, w = fits[h, 0], fits[h, 1], fits[h, 2], fits[h, 3]
-            s0 += d0 * u0
-            s1 += d0 * u1
-            s2 += d0 * u2
-            s3 += d1 * u0
-            s4 += d1 * u1
-            s5 += d1 * u2
-            s6 += d2 * u0
-            s7 += d2 * u1
-            s8 += d2 * u2
-            l0 -= w * d0
-            l1 -= w * d1
-            l2 -= w * d2
-        lanes[k], lanes[LANES + k], lanes[2 * LANES + k] = s0, s1, s2
-        lanes[3 * LANES + k], lanes[4 * LANES + k], lanes[5 * LANES + k] = s3, s4, s5
-        lanes[6 * LANES + k], lanes[7 * LANES + k], lanes[8 * LANES + k] = s6, s7, s8
-        laplace_x[i, 0], laplace_x[i, 1], laplace_x[i, 2] = l0, l1, l2
+            edge = load_row(x, neighbours[h]) - here
+            column0 += edge * fits[h, 0]
+            column1 += edge * fits[h, 1]
+            column2 += edge * fits[h, 2]
+            image -= edge * fits[h, 3]
+        lanes[k], lanes[3 * LANES + k] = lane(column0, 0), lane(column0, 1)
+        lanes[6 * LANES + k], lanes[LANES + k] = lane(column0, 2), lane(column1, 0)
+        lanes[4 * LANES + k], lanes[7 * LANES + k] = lane(column1, 1), lane(column1, 2)
+        lanes[2 * LANES + k], lanes[5 * LANES + k] = lane(column2, 0), lane(column2, 1)
+        lanes[8 * LANES + k] = lane(column2, 2)
+        laplace_x[i, 0], laplace_x[i, 1], laplace_x[i, 2] = (
+            lane(image, 0),
+            lane(image, 1),
+            lane(image, 2),
+        )
 
 
 @parallel_kernel
@@ -91,17 +89,16 @@ def residual(
             if fixed[i]:
                 out[i, 0] = out[i, 1] = out[i, 2] = 0.0
                 continue
-            v0, v1, v2 = own[i, 0], own[i, 1], own[i, 2]
-            b0 = R[i, 0] * v0 + R[i, 1] * v1 + R[i, 2] * v2 - laplace_x[i, 0]
-            b1 = R[i, 3] * v0 + R[i, 4] * v1 + R[i, 5] * v2 - laplace_x[i, 1]
-            b2 = R[i, 6] * v0 + R[i, 7] * v1 + R[i, 8] * v2 - laplace_x[i, 2]
+            # Eight products of R's entries and a vector's at a time, and the ninth.
+            turned = load(R, i * _ENTRIES, 8) * repeat_three(load_row(own, i))
+            last = R[i, 8] * own[i, 2]
             for h in range(np.uint64(starts[i]), np.uint64(starts[i + np.uint64(1)])):
                 j = np.uint64(neighbours[h])
-                v0, v1, v2 = pulls[h, 0], pulls[h, 1], pulls[h, 2]
-                b0 += R[j, 0] * v0 + R[j, 1] * v1 + R[j, 2] * v2
-                b1 += R[j, 3] * v0 + R[j, 4] * v1 + R[j, 5] * v2
-                b2 += R[j, 6] * v0 + R[j, 7] * v1 + R[j, 8] * v2
-            out[i, 0], out[i, 1], out[i, 2] = b0, b1, b2
+                turned += load(R, j * _ENTRIES, 8) * repeat_three(load_row(pulls, h))
+                last += R[j, 8] * pulls[h, 2]
+            out[i, 0] = lane(turned, 0) + lane(turned, 1) + lane(turned, 2) - laplace_x[i, 0]
+            out[i, 1] = lane(turned, 3) + lane(turned, 4) + lane(turned, 5) - laplace_x[i, 1]
+            out[i, 2] = lane(turned, 6) + lane(turned, 7) + last - laplace_x[i, 2]
 
 
 @kernel

@@ -281,8 +281,7 @@ def _climb(blocks: Blocks, schedule: Schedule, task: int, b: Floats, work: Work)
         y[v, 0], y[v, 1], y[v, 2] = b[v, 0], b[v, 1], b[v, 2]
     copies = len(b) + task * len(schedule.shared)
     y[copies : copies + len(schedule.shared)] = 0.0
-    for block in range(first, last + 1):
-        _send_up(blocks, block, y, work.sums[task])
+    _send_up(blocks, first, last, y, work.sums[task])
 
 
 @kernel
@@ -297,9 +296,9 @@ def _turn(blocks: Blocks, schedule: Schedule, b: Floats, x: Floats, work: Work) 
             for t in range(tasks):
                 y[v, d] += y[len(b) + t * len(shared) + h, d]
     for block in schedule.tops:
-        _send_up(blocks, block, y, work.sums[tasks])
+        _send_up(blocks, block, block, y, work.sums[tasks])
     for block in schedule.tops[::-1]:
-        _send_down(blocks, block, y, work.sums[tasks])
+        _send_down(blocks, block, block, y, work.sums[tasks])
     for h in range(len(shared)):
         v = shared[h]
         for d in range(3):
@@ -313,36 +312,39 @@ def _descend(blocks: Blocks, schedule: Schedule, task: int, x: Floats, work: Wor
     """Backward substitution in a task's subtree; the solution is added to x."""
     first, last = schedule.task_firsts[task], schedule.task_lasts[task]
     y = work.vectors
-    for block in range(last, first - 1, -1):
-        _send_down(blocks, block, y, work.sums[task])
+    _send_down(blocks, first, last, y, work.sums[task])
     for v in range(blocks.firsts[first], blocks.firsts[last + 1]):
         for d in range(3):
             x[v, d] += y[v, d]
 
 
 @kernel
-def _send_up(blocks: Blocks, block: int, y: Singles, sums: Singles) -> None:
-    """Forward substitution of one block: take G b from the later unknowns that it touches."""
-    begin, end = blocks.reach_starts[block], blocks.reach_starts[block + 1]
-    later = begin + blocks.firsts[block + 1] - blocks.firsts[block]
-    at = blocks.up_starts[block]
-    multiply(blocks.ups, at, end - later, y, blocks.reach, begin, later, sums)
-    for h in range(end - later):
-        v = blocks.reach[later + h]
-        y[v, 0] += sums[0, h]
-        y[v, 1] += sums[1, h]
-        y[v, 2] += sums[2, h]
+def _send_up(blocks: Blocks, first: int, last: int, y: Singles, sums: Singles) -> None:
+    """Forward substitution of blocks first to last: each takes G b from later unknowns."""
+    firsts, starts, reach = blocks.firsts, blocks.reach_starts, blocks.reach
+    for block in range(first, last + 1):
+        begin, end = starts[block], starts[block + 1]
+        later = begin + firsts[block + 1] - firsts[block]
+        at = blocks.up_starts[block]
+        multiply(blocks.ups, at, end - later, y, reach, begin, later, sums)
+        for h in range(end - later):
+            v = np.uint64(reach[later + h])
+            y[v, 0] += sums[0, h]
+            y[v, 1] += sums[1, h]
+            y[v, 2] += sums[2, h]
 
 
 @kernel
-def _send_down(blocks: Blocks, block: int, y: Singles, sums: Singles) -> None:
-    """Backward substitution of one block: its pivot's inverse times b, less G^T times the later."""
-    begin, end = blocks.reach_starts[block], blocks.reach_starts[block + 1]
-    first = blocks.firsts[block]
-    k = blocks.firsts[block + 1] - first
-    multiply(blocks.downs, blocks.down_starts[block + 1], k, y, blocks.reach, begin, end, sums)
-    for h in range(k):
-        y[first + h, 0], y[first + h, 1], y[first + h, 2] = sums[0, h], sums[1, h], sums[2, h]
+def _send_down(blocks: Blocks, first: int, last: int, y: Singles, sums: Singles) -> None:
+    """Backward substitution of blocks last to first: inverse times b, less G^T times the later."""
+    firsts, starts, reach = blocks.firsts, blocks.reach_starts, blocks.reach
+    for block in range(last, first - 1, -1):
+        begin, end = starts[block], starts[block + 1]
+        k = firsts[block + 1] - firsts[block]
+        multiply(blocks.downs, blocks.down_starts[block + 1], k, y, reach, begin, end, sums)
+        for h in range(k):
+            v = np.uint64(reach[begin + h])
+            y[v, 0], y[v, 1], y[v, 2] = sums[0, h], sums[1, h], sums[2, h]
 
 
 @kernel

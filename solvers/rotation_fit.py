@@ -4,8 +4,10 @@ R maximises trace(R^T S) over proper rotations (Kabsch 1976; Sorkine and Alexa 2
 where S is planar, a line, a point or a reflection. The fast path is the closed form of Markley 1993
 (Attitude determination using vector observations: a fast optimal matrix algorithm), on the largest
 root of its quartic; it has no branch and no trigonometry, so the compiler runs it on a whole vector
-of matrices. Where the closed form is ill-conditioned (two rotations nearly as good as each other)
-it is checked and replaced by Horn's 4x4 eigenproblem (Horn 1987) with Jacobi's method.
+of matrices, in several short passes: a processor that waits for a division can begin the next
+vector only if it is not far off. Where the closed form is ill-conditioned (two rotations nearly as
+good as each other) it is checked and replaced by Horn's 4x4 eigenproblem (Horn 1987) with Jacobi's
+method.
 """
 
 from __future__ import annotations
@@ -18,16 +20,19 @@ from solvers.compiled import kernel
 from solvers.laplacian import Floats
 
 _TINY = 1e-300
-_NOT_ORTHOGONAL = 1e-9  # squared; two Newton-Schulz steps take anything nearer to 1e-16
+_ORTHOGONAL = 1e-16  # squared; a Newton-Schulz step takes anything nearer to 1e-16
+_NEARLY_ORTHOGONAL = 1e-9  # squared; two steps do
 
 
 # Matrices are worked on LANES at a time, in a flat array of rows of LANES numbers: 9 rows of the
 # matrices, 9 of their rotations, 1 of the error. With a single array and constant strides the
 # compiler can prove that nothing overlaps, which it needs in order to use vector instructions.
+# Until there are rotations, their rows hold what the quartic is made of, and its root.
 LANES = 64
 _ROTATION = 9 * LANES
 _DEFECT = 18 * LANES
 SCRATCH = 19 * LANES
+_NORM2, _DET, _COF2, _ROOT = 9 * LANES, 10 * LANES, 11 * LANES, 12 * LANES
 
 
 @kernel
@@ -36,101 +41,114 @@ def fit_rotations(lanes: Floats, count: int) -> None:
 
     Only the first `count` of the LANES columns are looked at; matrices are row-major.
     """
+    _start_roots(lanes, count)
+    _polish_roots(lanes, count)
     _fit_well_conditioned(lanes, count)
+    _straighten(lanes, 0, count)
     for k in range(count):
-        if not lanes[_DEFECT + k] < _NOT_ORTHOGONAL:
-            _fit_one(lanes, k)
+        if not lanes[_DEFECT + k] < _ORTHOGONAL:
+            if lanes[_DEFECT + k] < _NEARLY_ORTHOGONAL:
+                _straighten(lanes, k, k + 1)
+            else:
+                _fit_one(lanes, k)
 
 
 @kernel
-def _fit_well_conditioned(lanes: Floats, count: int) -> None:
+def _start_roots(lanes: Floats, count: int) -> None:
+    """The coefficients of Markley's quartic, and a start for its largest root.
+
+    With n the squared norm of the matrix, it is (l^2 - n)^2 - 8 l det - 4 cof2. The start is its
+    root where det = 0; the quartic is convex from there on.
+    """
     for k in range(count):
         a, b, c = lanes[k], lanes[LANES + k], lanes[2 * LANES + k]
         d, e, f = lanes[3 * LANES + k], lanes[4 * LANES + k], lanes[5 * LANES + k]
         g, h, i = lanes[6 * LANES + k], lanes[7 * LANES + k], lanes[8 * LANES + k]
         norm2 = a * a + b * b + c * c + d * d + e * e + f * f + g * g + h * h + i * i
-        s = 1.0 / math.sqrt(max(norm2, _TINY))
-        a, b, c, d, e, f, g, h, i = a * s, b * s, c * s, d * s, e * s, f * s, g * s, h * s, i * s
-        # The cofactors, the determinant, and B^T B of the matrix B of norm one.
         ca, cb, cc = e * i - f * h, f * g - d * i, d * h - e * g
         cd, ce, cf = c * h - b * i, a * i - c * g, b * g - a * h
         cg, ch, ci = b * f - c * e, c * d - a * f, a * e - b * d
-        det = a * ca + b * cb + c * cc
         cof2 = (
             ca * ca + cb * cb + cc * cc + cd * cd + ce * ce + cf * cf + cg * cg + ch * ch + ci * ci
         )
-        xx, yy, zz = a * a + d * d + g * g, b * b + e * e + h * h, c * c + f * f + i * i
-        xy, xz, yz = a * b + d * e + g * h, a * c + d * f + g * i, b * c + e * f + h * i
-        # Markley's quartic (l^2 - 1)^2 - 8 l det - 4 cof2. This start is its root where det = 0;
-        # the quartic is convex from there on, so that Newton cannot miss the largest root.
-        root = math.sqrt(1.0 + 2.0 * math.sqrt(cof2))
-        for _ in range(4):
-            excess = root * root - 1.0
+        lanes[_NORM2 + k] = norm2
+        lanes[_DET + k] = a * ca + b * cb + c * cc
+        lanes[_COF2 + k] = cof2
+        lanes[_ROOT + k] = math.sqrt(norm2 + 2.0 * math.sqrt(cof2))
+
+
+@kernel
+def _polish_roots(lanes: Floats, count: int) -> None:
+    """Three steps of Halley's, which cannot miss the largest root of a quartic with four."""
+    for k in range(count):
+        norm2, det, cof2 = lanes[_NORM2 + k], lanes[_DET + k], lanes[_COF2 + k]
+        root = lanes[_ROOT + k]
+        for _ in range(3):
+            excess = root * root - norm2
             value = excess * excess - 8.0 * det * root - 4.0 * cof2
-            root -= value / (4.0 * root * excess - 8.0 * det + _TINY)
-        kappa = 0.5 * (root * root - 1.0)
+            slope = 4.0 * root * excess - 8.0 * det
+            half_bend = 6.0 * root * root - 2.0 * norm2
+            root -= value * slope / (slope * slope - value * half_bend + _TINY)
+        lanes[_ROOT + k] = root
+
+
+@kernel
+def _fit_well_conditioned(lanes: Floats, count: int) -> None:
+    """The closed form, R = ((kappa + n) S + root cof(S) - S S^T S) / (kappa root - det)."""
+    for k in range(count):
+        a, b, c = lanes[k], lanes[LANES + k], lanes[2 * LANES + k]
+        d, e, f = lanes[3 * LANES + k], lanes[4 * LANES + k], lanes[5 * LANES + k]
+        g, h, i = lanes[6 * LANES + k], lanes[7 * LANES + k], lanes[8 * LANES + k]
+        ca, cb, cc = e * i - f * h, f * g - d * i, d * h - e * g
+        cd, ce, cf = c * h - b * i, a * i - c * g, b * g - a * h
+        cg, ch, ci = b * f - c * e, c * d - a * f, a * e - b * d
+        norm2, root, det = lanes[_NORM2 + k], lanes[_ROOT + k], lanes[_DET + k]
+        kappa = 0.5 * (root * root - norm2)
         z = 1.0 / (kappa * root - det + _TINY)
-        m, n = (kappa + 1.0) * z, root * z
-        # R = ((kappa + 1) B + root cof(B) - B B^T B) / (kappa root - det)
-        r0 = m * a + n * ca - z * (a * xx + b * xy + c * xz)
-        r1 = m * b + n * cb - z * (a * xy + b * yy + c * yz)
-        r2 = m * c + n * cc - z * (a * xz + b * yz + c * zz)
-        r3 = m * d + n * cd - z * (d * xx + e * xy + f * xz)
-        r4 = m * e + n * ce - z * (d * xy + e * yy + f * yz)
-        r5 = m * f + n * cf - z * (d * xz + e * yz + f * zz)
-        r6 = m * g + n * cg - z * (g * xx + h * xy + i * xz)
-        r7 = m * h + n * ch - z * (g * xy + h * yy + i * yz)
-        r8 = m * i + n * ci - z * (g * xz + h * yz + i * zz)
-        # An error of the root leaves R's singular vectors right and its singular values a little
-        # off one; Newton-Schulz steps put them back.
-        worst = 0.0
-        for step in range(2):
-            xx, yy, zz = (
-                r0 * r0 + r3 * r3 + r6 * r6,
-                r1 * r1 + r4 * r4 + r7 * r7,
-                r2 * r2 + r5 * r5 + r8 * r8,
-            )
-            xy, xz, yz = (
-                r0 * r1 + r3 * r4 + r6 * r7,
-                r0 * r2 + r3 * r5 + r6 * r8,
-                r1 * r2 + r4 * r5 + r7 * r8,
-            )
-            if step == 0:
-                worst = (
-                    (xx - 1.0) * (xx - 1.0)
-                    + (yy - 1.0) * (yy - 1.0)
-                    + (zz - 1.0) * (zz - 1.0)
-                    + xy * xy
-                    + xz * xz
-                    + yz * yz
-                )
-            xx, yy, zz = 1.5 - 0.5 * xx, 1.5 - 0.5 * yy, 1.5 - 0.5 * zz
-            xy, xz, yz = -0.5 * xy, -0.5 * xz, -0.5 * yz
-            r0, r1, r2 = (
-                r0 * xx + r1 * xy + r2 * xz,
-                r0 * xy + r1 * yy + r2 * yz,
-                r0 * xz + r1 * yz + r2 * zz,
-            )
-            r3, r4, r5 = (
-                r3 * xx + r4 * xy + r5 * xz,
-                r3 * xy + r4 * yy + r5 * yz,
-                r3 * xz + r4 * yz + r5 * zz,
-            )
-            r6, r7, r8 = (
-                r6 * xx + r7 * xy + r8 * xz,
-                r6 * xy + r7 * yy + r8 * yz,
-                r6 * xz + r7 * yz + r8 * zz,
-            )
-        lanes[_ROTATION + k] = r0
-        lanes[_ROTATION + LANES + k] = r1
-        lanes[_ROTATION + 2 * LANES + k] = r2
-        lanes[_ROTATION + 3 * LANES + k] = r3
-        lanes[_ROTATION + 4 * LANES + k] = r4
-        lanes[_ROTATION + 5 * LANES + k] = r5
-        lanes[_ROTATION + 6 * LANES + k] = r6
-        lanes[_ROTATION + 7 * LANES + k] = r7
-        lanes[_ROTATION + 8 * LANES + k] = r8
-        lanes[_DEFECT + k] = worst
+        m, n = (kappa + norm2) * z, root * z
+        xx, yy = m - z * (a * a + d * d + g * g), m - z * (b * b + e * e + h * h)
+        zz = m - z * (c * c + f * f + i * i)
+        xy, xz = z * (a * b + d * e + g * h), z * (a * c + d * f + g * i)
+        yz = z * (b * c + e * f + h * i)
+        lanes[_ROTATION + k] = a * xx - b * xy - c * xz + n * ca
+        lanes[_ROTATION + LANES + k] = b * yy - a * xy - c * yz + n * cb
+        lanes[_ROTATION + 2 * LANES + k] = c * zz - a * xz - b * yz + n * cc
+        lanes[_ROTATION + 3 * LANES + k] = d * xx - e * xy - f * xz + n * cd
+        lanes[_ROTATION + 4 * LANES + k] = e * yy - d * xy - f * yz + n * ce
+        lanes[_ROTATION + 5 * LANES + k] = f * zz - d * xz - e * yz + n * cf
+        lanes[_ROTATION + 6 * LANES + k] = g * xx - h * xy - i * xz + n * cg
+        lanes[_ROTATION + 7 * LANES + k] = h * yy - g * xy - i * yz + n * ch
+        lanes[_ROTATION + 8 * LANES + k] = i * zz - g * xz - h * yz + n * ci
+
+
+@kernel
+def _straighten(lanes: Floats, first: int, last: int) -> None:
+    """A Newton-Schulz step of columns first to last, and how far from orthogonal they were.
+
+    An error of the root leaves R's singular vectors right and its singular values a little off
+    one. This puts them back.
+    """
+    for k in range(first, last):
+        a, b = lanes[_ROTATION + k], lanes[_ROTATION + LANES + k]
+        c, d = lanes[_ROTATION + 2 * LANES + k], lanes[_ROTATION + 3 * LANES + k]
+        e, f = lanes[_ROTATION + 4 * LANES + k], lanes[_ROTATION + 5 * LANES + k]
+        g, h = lanes[_ROTATION + 6 * LANES + k], lanes[_ROTATION + 7 * LANES + k]
+        i = lanes[_ROTATION + 8 * LANES + k]
+        xx, yy = a * a + d * d + g * g - 1.0, b * b + e * e + h * h - 1.0
+        zz = c * c + f * f + i * i - 1.0
+        xy, xz, yz = a * b + d * e + g * h, a * c + d * f + g * i, b * c + e * f + h * i
+        lanes[_DEFECT + k] = xx * xx + yy * yy + zz * zz + xy * xy + xz * xz + yz * yz
+        xx, yy, zz = 1.0 - 0.5 * xx, 1.0 - 0.5 * yy, 1.0 - 0.5 * zz
+        xy, xz, yz = -0.5 * xy, -0.5 * xz, -0.5 * yz
+        lanes[_ROTATION + k] = a * xx + b * xy + c * xz
+        lanes[_ROTATION + LANES + k] = a * xy + b * yy + c * yz
+        lanes[_ROTATION + 2 * LANES + k] = a * xz + b * yz + c * zz
+        lanes[_ROTATION + 3 * LANES + k] = d * xx + e * xy + f * xz
+        lanes[_ROTATION + 4 * LANES + k] = d * xy + e * yy + f * yz
+        lanes[_ROTATION + 5 * LANES + k] = d * xz + e * yz + f * zz
+        lanes[_ROTATION + 6 * LANES + k] = g * xx + h * xy + i * xz
+        lanes[_ROTATION + 7 * LANES + k] = g * xy + h * yy + i * yz
+        lanes[_ROTATION + 8 * LANES + k] = g * xz + h * yz + i * zz
 
 
 @kernel
