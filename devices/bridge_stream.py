@@ -219,7 +219,12 @@ class BridgeStream:
             for listener in self._listeners:
                 listener(frame)
         self._frames += len(frames)
-        self._inbox.put(frames)
+        if not self._told.is_set():
+            self._tell()
+        self._inbox.put(frames)  # last: who wakes needs the interpreter that this thread holds
+
+    def _tell(self) -> None:
+        """Wake who opens us, once there is a skeleton or a reason why there will be none."""
         if self._receiver.skeleton is not None or self._receiver.other_version is not None:
             self._told.set()
 
