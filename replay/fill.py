@@ -28,12 +28,14 @@ Indices = NDArray[np.int64]
 Records = NDArray[np.void]
 Record = Any  # one of them; compiled code writes through it
 
-# Of each joint: its parent, itself for the root. Where it stands from there at rest; where it stood
-# when it was last seen, and when; where it is taken to stand if it is not seen now. The mean length
-# of its bone, and over how many frames.
+# Of each joint: its parent, itself for the root; the joints one after another, parents first.
+# Where it stands at rest, from its parent or, the root, from the origin; where it stood from its
+# parent when it was last seen, and when; where it is taken to stand if it is not seen now. The mean
+# length of its bone, and over how many frames.
 _JOINT = np.dtype(
     [
         ("parent", np.int64),
+        ("order", np.int64),
         ("rest", np.float64, 3),
         ("offset", np.float64, 3),
         ("seen_at", np.float64),
@@ -90,13 +92,12 @@ class Filler:
         self.skeleton = skeleton
         self.hold = hold
         self.ease = ease
-        rest = skeleton.rest_positions
-        self._order = np.array(skeleton.order, dtype=np.int64)
-        self._rest_root = rest[skeleton.root].copy()
+        rest, root = skeleton.rest_positions, skeleton.root
+        parents = np.where(skeleton.parents < 0, root, skeleton.parents)
         self._unseen = np.zeros(len(rest), _JOINT)
-        parents = np.where(skeleton.parents < 0, skeleton.root, skeleton.parents)
-        self._unseen["parent"] = parents
+        self._unseen["parent"], self._unseen["order"] = parents, skeleton.order
         self._unseen["rest"] = self._unseen["offset"] = rest - rest[parents]
+        self._unseen["rest"][root] = rest[root]
         self._unseen["seen_at"] = -np.inf
         self._memories: dict[int, _Memory] = {}
 
@@ -120,13 +121,7 @@ class Filler:
             raise ValueError(f"Expected positions {expected}, got {positions.shape}")
         memory = self._memory(performer)
         placed, filled = positions.copy(), np.empty(len(positions), dtype=np.bool_)
-        if _look(memory.joints, placed, filled, time):
-            scale = _scale(memory.joints)
-            _guess(memory.joints, scale, time, self.hold, self.ease)
-            root = self._rest_root * scale if np.isnan(memory.root[0]) else memory.root
-            _place(memory.joints, self._order, placed, filled, root)
-        _remember(memory.joints, placed, filled, time)
-        memory.root[:] = placed[self._order[0]]
+        _fill(memory.joints, memory.root, placed, filled, (time, self.hold, self.ease))
         return FilledFrame(placed, filled)
 
     def _memory(self, performer: int) -> _Memory:
@@ -137,6 +132,21 @@ class Filler:
             if len(self._memories) > MOST_PERFORMERS:
                 del self._memories[next(iter(self._memories))]
         return memory
+
+
+@_kernel
+def _fill(
+    joints: Records, root: Array, positions: Array, filled: Bools, times: tuple[float, float, float]
+) -> None:
+    time, hold, ease = times
+    if _look(joints, positions, filled, time):
+        scale = _scale(joints)
+        _guess(joints, scale, time, hold, ease)
+        if np.isnan(root[0]):
+            root[:] = joints[joints[0].order].rest * scale
+        _place(joints, positions, filled, root)
+    _remember(joints, positions, filled, time)
+    root[:] = positions[joints[0].order]
 
 
 @_kernel
@@ -153,11 +163,16 @@ def _look(joints: Records, positions: Array, filled: Bools, time: float) -> bool
         filled[index] = not was_seen(positions[index])
         joint.seen_at = min(joint.seen_at, time)  # a clock that went back
     for index, joint in enumerate(joints):
-        if not filled[index] and not filled[joint.parent] and _length(joint.rest) > 0.0:
+        if _is_bone(joint, index) and not filled[index] and not filled[joint.parent]:
             joint.count += 1
             length = _length(positions[index] - positions[joint.parent])
             joint.length += (length - joint.length) / joint.count
     return bool(filled.any())
+
+
+@_kernel
+def _is_bone(joint: Record, index: int) -> bool:
+    return bool(joint.parent != index and _length(joint.rest) > 0.0)
 
 
 @_kernel
@@ -187,9 +202,9 @@ def _guess(joints: Records, scale: float, time: float, hold: float, ease: float)
 
 
 @_kernel
-def _place(joints: Records, order: Indices, positions: Array, filled: Bools, root: Array) -> None:
+def _place(joints: Records, positions: Array, filled: Bools, root: Array) -> None:
     """Put joints that must be filled where they stand from their parents."""
-    placed = ~filled
+    placed, order = ~filled, joints["order"]
     if filled[order[0]]:
         positions[order[0]] = root
         placed[order[0]] = True
