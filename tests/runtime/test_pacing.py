@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
+from devices.bridge_inbox import NewestOfEach
 from devices.inbox import Inbox
 from devices.simulator import Simulator
 from devices.skeleton import SkeletonFrame
@@ -77,12 +80,17 @@ def test_what_can_be_waited_for_is_waited_for() -> None:
         assert isinstance(pace_of(simulated), Ticker)
 
 
-def test_an_inbox_can_be_waited_for() -> None:
-    inbox = Inbox(2)
+@pytest.mark.parametrize("make", [lambda: Inbox(2), NewestOfEach])
+def test_an_inbox_can_be_waited_for(make: Callable[[], Inbox | NewestOfEach]) -> None:
+    inbox = make()
     frame = SkeletonFrame(0.0, np.zeros((1, 3)), None, np.ones(1))
     inbox.put([])
     assert not inbox.wait(0.0)
     inbox.put([frame, frame, frame])
     assert inbox.wait(0.0)
-    assert len(inbox.take()) == 2
+    assert inbox.wait(0.0)  # until they are taken
+    assert len(inbox.take()) == 3 - inbox.dropped
     assert not inbox.wait(0.0)
+    inbox.put([frame])
+    inbox.take()
+    assert not inbox.wait(0.0)  # nor for what was taken without waiting
