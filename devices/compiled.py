@@ -1,4 +1,4 @@
-"""How a decoder's few hot loops are compiled.
+"""How the few hot loops of decoders, and of the fill stage, are compiled.
 
 Between two frames the solvers sweep the caches, and every NumPy call that has to be fetched again
 then takes 10 to 30 us; a whole compiled loop takes no more than one of them. These loops last

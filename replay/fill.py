@@ -7,14 +7,13 @@ along with the shoulders.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, TypeVar, cast
+from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from devices.compiled import kernel
 from devices.skeleton import Skeleton, SkeletonFrame
 
 HOLD_SECONDS = 0.5
@@ -44,13 +43,6 @@ _JOINT = np.dtype(
         ("count", np.int64),
     ]
 )
-
-_Function = TypeVar("_Function", bound=Callable[..., object])
-
-
-def _kernel(function: _Function) -> _Function:
-    """Compile; not as the solvers do, which this room does not know."""
-    return cast(_Function, njit(cache=True, nogil=True, error_model="numpy")(function))
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -134,7 +126,7 @@ class Filler:
         return memory
 
 
-@_kernel
+@kernel
 def _fill(
     joints: Records, root: Array, positions: Array, filled: Bools, times: tuple[float, float, float]
 ) -> None:
@@ -149,14 +141,14 @@ def _fill(
     root[:] = positions[joints[0].order]
 
 
-@_kernel
+@kernel
 def was_seen(place: Array) -> bool:
     """Whether a place (3,) [m] has no NaN and lies not beyond `FARTHEST`."""
     x, y, z = np.abs(place)
     return bool(x <= FARTHEST and y <= FARTHEST and z <= FARTHEST)
 
 
-@_kernel
+@kernel
 def _look(joints: Records, positions: Array, filled: Bools, time: float) -> bool:
     """Tell which joints must be filled, and whether any; measure the bones that are seen."""
     for index, joint in enumerate(joints):
@@ -170,12 +162,12 @@ def _look(joints: Records, positions: Array, filled: Bools, time: float) -> bool
     return bool(filled.any())
 
 
-@_kernel
+@kernel
 def _is_bone(joint: Record, index: int) -> bool:
     return bool(joint.parent != index and _length(joint.rest) > 0.0)
 
 
-@_kernel
+@kernel
 def _scale(joints: Records) -> float:
     """How much larger the performer is than the rest pose."""
     ratios = np.empty(len(joints))
@@ -187,7 +179,7 @@ def _scale(joints: Records) -> float:
     return float(np.median(ratios[:known])) if known > 0 else 1.0
 
 
-@_kernel
+@kernel
 def _guess(joints: Records, scale: float, time: float, hold: float, ease: float) -> None:
     """Tell where each joint stands from its parent if it is not seen now."""
     for joint in joints:
@@ -201,7 +193,7 @@ def _guess(joints: Records, scale: float, time: float, hold: float, ease: float)
             turn(joint.offset, joint.rest * scale, w * w * (3.0 - 2.0 * w), joint.guess)
 
 
-@_kernel
+@kernel
 def _place(joints: Records, positions: Array, filled: Bools, root: Array) -> None:
     """Put joints that must be filled where they stand from their parents."""
     placed, order = ~filled, joints["order"]
@@ -219,7 +211,7 @@ def _place(joints: Records, positions: Array, filled: Bools, root: Array) -> Non
             positions[joint] = positions[joints[joint].parent] + joints[joint].guess
 
 
-@_kernel
+@kernel
 def _nearest_seen(order: Indices, filled: Bools) -> int:
     for joint in order:
         if not filled[joint]:
@@ -227,7 +219,7 @@ def _nearest_seen(order: Indices, filled: Bools) -> int:
     return int(order[0])
 
 
-@_kernel
+@kernel
 def _remember(joints: Records, positions: Array, filled: Bools, time: float) -> None:
     # A joint whose parent was guessed keeps its old offset only while the guess came from it;
     # elsewhere the offset from the guess is what keeps the joint still when it disappears.
@@ -237,7 +229,7 @@ def _remember(joints: Records, positions: Array, filled: Bools, time: float) -> 
             joint.seen_at = time
 
 
-@_kernel
+@kernel
 def turn(start: Array, end: Array, weight: float, out: Array) -> None:
     """Put a vector on its way from `start` to `end` (3,), by `weight` in [0, 1], into `out` (3,).
 
@@ -262,6 +254,6 @@ def turn(start: Array, end: Array, weight: float, out: Array) -> None:
     out[:] = length * (np.cos(angle) * a + np.sin(angle) * side)
 
 
-@_kernel
+@kernel
 def _length(vector: Array) -> float:
     return float(np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2))

@@ -28,7 +28,8 @@ def kernel(function: _Function) -> _Function:
     """Compile a function ahead of its second run: cached on disk, reductions may be reordered.
 
     The order is fixed when the code is compiled, so that two runs still agree to the last bit.
-    NaN and infinity keep their meaning. Other threads go on meanwhile: a device's must stamp what
+    NaN and infinity keep their meaning, but ask of a value whether it is one, not of a sum: terms
+    of that may cancel. Other threads go on meanwhile: a device's must stamp what
     arrives when it arrives.
     """
     return cast(

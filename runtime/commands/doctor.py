@@ -14,9 +14,12 @@ from pathlib import Path
 import numpy as np
 
 from devices.address import LOOPBACK
+from devices.bridge_messages import LATEST
+from devices.bridge_receiver import BridgeReceiver
 from devices.errors import InputError
 from devices.port_owner import port_owner
 from devices.udp import QUEUE
+from devices.vmc import VmcDecoder
 from replay.builtin import builtin_recording
 from replay.player import EveryFrame, Player
 from runtime.characters.builtin import BUILTIN, builtin_character
@@ -182,6 +185,8 @@ def _warm() -> None:
     recording = builtin_recording()
     performer = Performer(recording.skeleton)
     puppets = [Puppet(builtin_character(name)) for name in BUILTIN]
+    VmcDecoder()  # compiles what reads its packets
+    BridgeReceiver(LATEST)
     proxy_of(puppets[0].character, dense=0, count=1_000)  # as for a dense character
     puppets[0].skin.elasticity = Elasticity(cartoon=1.0, volume_gain=1.5, stiffness=0.5)
     anchors = len(puppets[1].binding.node)
