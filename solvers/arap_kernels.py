@@ -69,8 +69,9 @@ def fit_cells(x: Floats, cells: Cells, R: Floats, laplace_x: Floats, room: Float
         covariances(x, cells, first, size, lanes, laplace_x)
         fit_rotations(lanes, size)
         for k in range(size):
+            i = np.uint64(first + k)
             for entry in range(9):
-                R[first + k, entry] = lanes[_R + entry * LANES + k]
+                R[i, entry] = lanes[_R + entry * LANES + k]
 
 
 @parallel_kernel
