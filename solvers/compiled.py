@@ -18,8 +18,10 @@ os.environ.setdefault("OMP_WAIT_POLICY", "PASSIVE")
 
 import numba
 
-# Below this many vertices, waking a second thread takes longer than what it would do.
-_WORTH_SHARING = 7000
+# Below this many vertices a second thread costs as much as it gives: between frames it has fallen
+# asleep, and in a show the other cores are the renderer's and the devices' (measured frame by frame
+# in `bunraku bench latency`: even at 15 000 vertices on free cores, worse beside a busy one).
+_WORTH_SHARING = 20_000
 
 _Function = TypeVar("_Function", bound=Callable[..., object])
 
