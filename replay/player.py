@@ -69,7 +69,10 @@ class RealTime:
 
 
 class EveryFrame:
-    """Each poll gives exactly the next frame, whatever the clock; stamps are the timeline's own."""
+    """Each poll gives exactly the next frame, whatever the clock.
+
+    Stamps are the timeline's own, and nobody knows when frames arrive.
+    """
 
     frames_a_poll = 1.0
 
@@ -190,7 +193,7 @@ class Player:
         if self.loop and self._next == len(self.recording):
             self._next = 0
             self._shift += self._pass_seconds
-        came = self._pace.stamp(playhead if math.isfinite(playhead) else at)
+        came = self._pace.stamp(playhead) if math.isfinite(playhead) else math.nan
         return replace(frame, time=self._pace.stamp(at), arrival=came)
 
     @property

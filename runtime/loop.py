@@ -50,6 +50,8 @@ class FrameLoop:
         frames: frames performed so far.
         received: frames that came so far.
         seconds: performer's time from the first of them to the last [s].
+        latency: [s] from the newest frame's arrival until it was handed on to be shown; NaN where
+            nobody knows when it came.
     """
 
     def __init__(
@@ -70,6 +72,7 @@ class FrameLoop:
         self.frozen = False
         self.frames = self.received = 0
         self.seconds = 0.0
+        self.latency = math.nan
         self._began = float("nan")
         self._stream = stream
         self._acts = (Act(performer, puppets, director), *others)
@@ -170,13 +173,13 @@ class FrameLoop:
         if not self.frozen:
             self._motions = motions
             self._unsettled = True
-        self._publish(frame.time)
+        self._publish(frame)
         self._began = frame.time if self.frames == 0 else self._began
         self.seconds = frame.time - self._began
         self.frames += 1
 
-    def _publish(self, at: float) -> None:
-        step = self._picture_step
+    def _publish(self, frame: SkeletonFrame) -> None:
+        at, step = frame.time, self._picture_step
         wanted = math.isfinite(step) and at - self._pictured >= step
         picture = None
         with self._timer.stage("render"):
@@ -185,6 +188,9 @@ class FrameLoop:
             if self._theatre is not None and wanted:
                 picture = self._theatre.picture()
                 self._pictured, self._pictured_at = at, self._clock()
+        self.latency = self._clock() - frame.arrival
+        if math.isfinite(self.latency):
+            self._report.times.add("latency", self.latency)
         with self._timer.stage("publish"):
             for motion, kept in zip(self._motions, self._outputs, strict=True):
                 performed = PerformedFrame(

@@ -45,11 +45,12 @@ class Progress:
                 desc=label, total=total, file=self._stream, unit=" frames", dynamic_ncols=True
             )
 
-    def advance(self, steps: int = 1) -> None:
-        """Say that `steps` more steps are done."""
+    def advance(self, steps: int = 1, *, said: str = "") -> None:
+        """Say that `steps` more steps are done, and on a terminal what else is `said`."""
         self._done += steps
         with suppress(OSError, ValueError):  # nobody listens any more, or the stream is closed
             if self._bar is not None:
+                self._bar.set_postfix_str(said, refresh=False)
                 self._bar.update(steps)
             else:
                 self._tell()

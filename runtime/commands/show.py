@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import sys
 from collections.abc import Callable
@@ -187,7 +188,7 @@ class _Show:
             with held():  # so that all outputs have the same frames
                 performed = loop.tick()
             if performed:
-                progress.advance()
+                progress.advance(said=_milliseconds(loop.latency))
             if controls is not None:
                 controls.present()
                 controls.serve()
@@ -347,3 +348,8 @@ class _Show:
                 for drive in puppet.mapping.drives
             ]
             part.matched(puppet.mapping.score, pairs)
+
+
+def _milliseconds(seconds: float) -> str:
+    """For a puppeteer's eye; nothing where it is not known."""
+    return f"{1e3 * seconds:.1f} ms" if math.isfinite(seconds) else ""

@@ -100,10 +100,11 @@ class Report:
     The keys: ``frames``, ``dropped``, ``recording`` {frames, joints, seconds}, ``record`` {frames,
     lost, fault} of the recording that was made, or null, ``character``
     {vertices, faces, nodes}, ``match`` {score, pairs: [{source: [joint names], target: [node
-    ids]}]}, ``stages_ms`` {poll, match, retarget, deform, render, publish, frame: {p50, p99, max}},
-    ``stretch`` {mean, p99}, ``watchdog`` {energy {p50, max}, stretch {p99, max}, inverted {max,
-    last, longest, frames}}. With several characters ``character``, ``match``, ``stretch`` and
-    ``watchdog`` are those of the first, and ``characters`` lists them for each, with its ``name``.
+    ids]}]}, ``stages_ms`` {poll, match, retarget, deform, render, publish, frame, settle, latency:
+    {p50, p99, max}}, ``stretch`` {mean, p99}, ``watchdog`` {energy {p50, max}, stretch {p99, max},
+    inverted {max, last, longest, frames}}. With several characters ``character``, ``match``,
+    ``stretch`` and ``watchdog`` are those of the first, and ``characters`` lists them for each,
+    with its ``name``.
     A value that is not a finite number is written as null: the file is JSON by the letter of
     RFC 8259.
 

@@ -9,7 +9,7 @@ from time import perf_counter
 
 import numpy as np
 
-STAGES = ("poll", "match", "retarget", "deform", "render", "publish", "frame", "settle")
+STAGES = ("poll", "match", "retarget", "deform", "render", "publish", "frame", "settle", "latency")
 
 _FIRST = 1e-4  # [ms] what is shorter counts as this
 _BINS_A_FOLD = 200  # for every factor of e: a bin is half a percent wide
@@ -21,7 +21,8 @@ class StageTimes:
 
     A histogram whose bins are half a percent wide, and the longest sample as it was. The stages are
     those of the report: ``poll``, ``match``, ``retarget``, ``deform``, ``render``, ``publish`` for
-    the outputs, ``frame`` for all of a tick, and ``settle`` for what comes after it.
+    the outputs, ``frame`` for all of a tick, ``settle`` for what comes after it, and
+    ``latency`` from a frame's arrival until it is handed on to be shown, where that is known.
     """
 
     def __init__(self) -> None:

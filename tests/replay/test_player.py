@@ -87,7 +87,7 @@ def test_every_frame_comes_exactly_once_whatever_the_clock() -> None:
         assert len(polls) == 1
         frames += polls
     assert [frame.time for frame in frames] == UNEVEN
-    assert [frame.arrival for frame in frames] == UNEVEN
+    assert all(math.isnan(frame.arrival) for frame in frames)
     assert player.poll() == []
 
 
@@ -216,7 +216,7 @@ def test_time_never_falls_whatever_is_done(
             player.resume()
         for frame in player.poll():
             assert frame.time >= newest - 1e-9
-            assert frame.arrival >= frame.time - 1e-9
+            assert not frame.arrival < frame.time - 1e-9
             newest = frame.time
 
 

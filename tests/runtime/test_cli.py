@@ -120,7 +120,7 @@ def _check_report(report: dict[str, Any]) -> None:
         assert set(pair["source"]) <= joints
         assert set(pair["target"]) <= set(range(len(character.skeleton.names)))
     assert set(report["stages_ms"]) == {
-        "poll", "match", "retarget", "deform", "render", "publish", "frame", "settle",
+        "poll", "match", "retarget", "deform", "render", "publish", "frame", "settle", "latency",
     }  # fmt: skip
     for stage in report["stages_ms"].values():
         assert 0.0 <= stage["p50"] <= stage["p99"] <= stage["max"]

@@ -156,9 +156,19 @@ def test_all_stages_are_timed_once_a_frame(puppet: Puppet) -> None:
     play(loop, player)
     loop.tick()
     stages = {name: int(counts.sum()) for name, counts in report.times._counts.items()}
+    assert stages.pop("latency") == 0  # nobody knows when the frames of a file arrived
     assert stages == dict.fromkeys(
         ("poll", "match", "retarget", "deform", "render", "publish", "frame", "settle"), 5
     )
+
+
+def test_latency_is_told_from_arrival_on(puppet: Puppet) -> None:
+    frames = [replace(captured(waving(1)[0]), arrival=12.0)]
+    report = Report(None)
+    loop = loop_of(Wire(frames), [puppet], [[Kept()]], report=report, clock=lambda: 12.004)
+    loop.tick()
+    assert loop.latency == pytest.approx(0.004)
+    assert report.times.summary()["latency"]["max"] == pytest.approx(4.0)
 
 
 def test_outputs_are_called_in_order_each_with_its_own_puppet(puppet: Puppet) -> None:

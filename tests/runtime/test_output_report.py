@@ -30,7 +30,7 @@ def test_the_report_has_the_keys_that_others_read(tmp_path: Path) -> None:
     written = json.loads((tmp_path / "r.json").read_text(), parse_constant=refuse)
     stages = written.pop("stages_ms")
     assert list(stages) == [
-        *("poll", "match", "retarget", "deform", "render", "publish", "frame", "settle")
+        *("poll", "match", "retarget", "deform", "render", "publish", "frame", "settle", "latency")
     ]
     assert stages["deform"] == pytest.approx({"p50": 2.0, "p99": 2.0, "max": 2.0}, rel=0.005)
     assert stages["render"] == {"p50": 0.0, "p99": 0.0, "max": 0.0}

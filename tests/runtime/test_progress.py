@@ -43,9 +43,10 @@ def test_a_terminal_gets_a_bar(total: int | None) -> None:
     terminal = Terminal()
     with Progress("replay", total, stream=terminal) as progress:
         for _ in range(30):
-            progress.advance()
+            progress.advance(said="3.1 ms")
     assert "replay" in terminal.getvalue()
     assert "30" in terminal.getvalue()
+    assert "3.1 ms" in terminal.getvalue()
     assert terminal.getvalue().endswith("\n")
     progress.close()
 
