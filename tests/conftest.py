@@ -1,11 +1,16 @@
-"""Shared fixtures: where the real recordings and meshes lie, and a strict floating-point state."""
+"""Shared fixtures: where the real recordings and meshes lie, a GL context, a seed."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
+import moderngl
 import numpy as np
 import pytest
+
+from devices.errors import InputError
+from runtime.render.context import headless_context, release_headless
 
 SHARED = Path(__file__).resolve().parents[1].parent / "shared" / "data"
 
@@ -16,6 +21,17 @@ def shared() -> Path:
     if not SHARED.is_dir():
         pytest.skip(f"needs the real recordings and meshes in {SHARED}, which are not here")
     return SHARED
+
+
+@pytest.fixture(scope="module")
+def context() -> Iterator[moderngl.Context]:
+    """A GL context without a screen; skips where there can be none."""
+    try:
+        context = headless_context()
+    except InputError as error:
+        pytest.skip(str(error))
+    yield context
+    release_headless(context)
 
 
 @pytest.fixture(autouse=True)

@@ -2,26 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import moderngl
 import numpy as np
 import pytest
 
-from devices.errors import InputError
 from runtime.benchmarks.latency import WARM_UP, WAYS, measured
 from runtime.cli import main
-from runtime.render.context import headless_context, release_headless
-
-
-@pytest.fixture(scope="module")
-def context() -> Iterator[moderngl.Context]:
-    try:
-        context = headless_context()
-    except InputError as error:
-        pytest.skip(str(error))
-    yield context
-    release_headless(context)
 
 
 @pytest.mark.parametrize("way", WAYS)

@@ -9,7 +9,6 @@ import moderngl
 import numpy as np
 import pytest
 
-from devices.errors import InputError
 from devices.stream import open_stream
 from replay.formats import read_recording
 from replay.player import EveryFrame, Player
@@ -17,23 +16,12 @@ from runtime.actions import ACTIONS, MOST
 from runtime.conditioning.switches import SWITCHES
 from runtime.controls import KEYS
 from runtime.puppet import Puppet
-from runtime.render.context import headless_context, release_headless
 from runtime.skin import Elasticity
 from runtime.theatre import BLACKOUT
 from tests.runtime.figures import frame, make_figure, pose, record, waving
 from tests.runtime.staged import Show
 
 FADERS = {"cartoon": "cartoon", "volume": "volume_gain", "stiffness": "stiffness"}
-
-
-@pytest.fixture(scope="module")
-def context() -> Iterator[moderngl.Context]:
-    try:
-        context = headless_context()
-    except InputError as error:
-        pytest.skip(str(error))
-    yield context
-    release_headless(context)
 
 
 @pytest.fixture(scope="module")

@@ -9,13 +9,11 @@ import moderngl
 import numpy as np
 import pytest
 
-from devices.errors import InputError
 from replay.player import EveryFrame, Player
 from runtime.actions import ACTIONS
 from runtime.controls import KEYS, Controls, key_help
 from runtime.puppet import Puppet
 from runtime.render.camera import Camera, front_camera
-from runtime.render.context import headless_context, release_headless
 from runtime.window import Event, KeyPressed, Resized
 from tests.runtime.figures import make_figure, record, waving
 from tests.runtime.staged import SIZE, Show
@@ -55,16 +53,6 @@ class Seat(Show):
     def state(self) -> dict[str, float]:
         """What every action that shows something shows."""
         return {name: action.read(self.desk) for name, action in ACTIONS.items() if action.read}
-
-
-@pytest.fixture(scope="module")
-def context() -> Iterator[moderngl.Context]:
-    try:
-        context = headless_context()
-    except InputError as error:
-        pytest.skip(str(error))
-    yield context
-    release_headless(context)
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Self
 
@@ -12,7 +12,6 @@ import moderngl
 import numpy as np
 import pytest
 
-from devices.errors import InputError
 from devices.skeleton import SkeletonFrame
 from replay.player import EveryFrame, Player, RealTime
 from replay.recorded_stream import RecordedStream
@@ -26,7 +25,6 @@ from runtime.output.output import PerformedFrame
 from runtime.output.report import Report
 from runtime.performer import Performer
 from runtime.puppet import Puppet
-from runtime.render.context import headless_context, release_headless
 from runtime.theatre import Theatre
 from tests.runtime.figures import (
     ARMS,
@@ -81,16 +79,6 @@ class Tape:
 @pytest.fixture(scope="module")
 def puppet() -> Puppet:
     return Puppet(make_figure())
-
-
-@pytest.fixture(scope="module")
-def context() -> Iterator[moderngl.Context]:
-    try:
-        context = headless_context()
-    except InputError as error:
-        pytest.skip(str(error))
-    yield context
-    release_headless(context)
 
 
 def loop_of(  # what every show needs, with what a test cares for

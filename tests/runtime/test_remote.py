@@ -16,7 +16,6 @@ from pythonosc.dispatcher import Dispatcher
 from pythonosc.osc_server import BlockingOSCUDPServer
 from pythonosc.udp_client import SimpleUDPClient
 
-from devices.errors import InputError
 from devices.osc import Message, write_bundles, write_message
 from replay.player import EveryFrame, Player
 from runtime.actions import ACTIONS
@@ -34,22 +33,11 @@ from runtime.remote import (
     _is_near,
     wish_of,
 )
-from runtime.render.context import headless_context, release_headless
 from tests.runtime.figures import make_figure, record, waving
 from tests.runtime.staged import Show
 
 LOOPBACK = "127.0.0.1"
 SOON = 30.0  # [s] after which a test is taken to hang
-
-
-@pytest.fixture(scope="module")
-def context() -> Iterator[moderngl.Context]:
-    try:
-        context = headless_context()
-    except InputError as error:
-        pytest.skip(str(error))
-    yield context
-    release_headless(context)
 
 
 @pytest.fixture(scope="module")

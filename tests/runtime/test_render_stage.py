@@ -25,7 +25,6 @@ from runtime.render.camera import front_camera
 from runtime.render.context import (
     headless_context,
     is_software,
-    release_headless,
     renderer_name,
 )
 from runtime.render.inset import SkeletonInset
@@ -36,16 +35,6 @@ GOLDEN = Path(__file__).resolve().parents[1] / "data" / "golden"
 SIZE = (320, 180)
 CAMERA = front_camera().frame([[-0.6, 0.0, -0.4], [0.6, 1.6, 0.4]], 16 / 9)
 RED, BLUE = (0.6, 0.05, 0.03, 1.0), (0.04, 0.16, 0.55, 1.0)
-
-
-@pytest.fixture(scope="module")
-def context() -> Iterator[moderngl.Context]:
-    try:
-        context = headless_context()
-    except InputError as error:
-        pytest.skip(str(error))
-    yield context
-    release_headless(context)
 
 
 @pytest.fixture(autouse=True)

@@ -8,29 +8,17 @@ import moderngl
 import numpy as np
 import pytest
 
-from devices.errors import InputError
 from devices.skeleton import Skeleton
 from runtime.mapping import Mapping
 from runtime.performer import Performer, Pose, rest_state
 from runtime.puppet import Body, Motion, Puppet
 from runtime.render.background import NOTHING
 from runtime.render.camera import Camera, box_corners
-from runtime.render.context import headless_context, release_headless
 from runtime.theatre import BLACKOUT, GAP, Theatre
 from tests.runtime.figures import ARMS, BODY, FRONT_VIEW, T_POSE, frame, make_figure, pose
 
 SIZE = (96, 54)
 WIDE = ((0.24, 0.72, -0.16), (1.6, 0.96, 0.16))
-
-
-@pytest.fixture(scope="module")
-def context() -> Iterator[moderngl.Context]:
-    try:
-        context = headless_context()
-    except InputError as error:
-        pytest.skip(str(error))
-    yield context
-    release_headless(context)
 
 
 @pytest.fixture(scope="module")
