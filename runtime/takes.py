@@ -62,7 +62,7 @@ class Takes:
         if self.recording:
             return
         try:
-            self.record(self._open(self._fresh()))
+            self.record(self._open(_fresh(self._path)))
         except InputError as error:
             self._tell(f"{error}; the show goes on without being recorded")
 
@@ -88,15 +88,33 @@ class Takes:
     def __exit__(self, *exc: object) -> None:
         self.close()
 
-    def _fresh(self) -> Path:
-        """An empty file beside `path`, under the first name that nothing had."""
-        for number in range(1, MOST + 1):
-            path = self._path.with_name(f"{self._path.stem}-{number}{self._path.suffix}")
-            try:
-                path.touch(exist_ok=False)
-            except FileExistsError:
-                continue
-            except OSError as error:
-                raise InputError(f"cannot write {path}: {error.strerror or error}") from error
-            return path
-        raise InputError(f"there are {MOST} takes beside {self._path}; move some away")
+
+def set_aside(path: Path, tell: Callable[[str], None]) -> None:
+    """Give the take that is at `path`, if there is one, a name of its own: it cannot be made again.
+
+    Raises:
+        InputError: it cannot be renamed.
+    """
+    if not path.is_file() or path.stat().st_size == 0:
+        return
+    kept = _fresh(path)
+    try:
+        path.replace(kept)
+    except OSError as error:
+        kept.unlink()
+        raise InputError(f"cannot rename {path}, an earlier take: {error.strerror}") from error
+    tell(f"{path} was there from earlier and is called {kept.name} now")
+
+
+def _fresh(beside: Path) -> Path:
+    """An empty file beside a take, under the first name that nothing had."""
+    for number in range(1, MOST + 1):
+        path = beside.with_name(f"{beside.stem}-{number}{beside.suffix}")
+        try:
+            path.touch(exist_ok=False)
+        except FileExistsError:
+            continue
+        except OSError as error:
+            raise InputError(f"cannot write {path}: {error.strerror or error}") from error
+        return path
+    raise InputError(f"there are {MOST} takes beside {beside}; move some away")

@@ -17,6 +17,7 @@ from runtime.clock import Ticker
 from runtime.interrupt import held
 from runtime.output.whole_file import check_writable
 from runtime.provenance import provenance
+from runtime.takes import set_aside
 from runtime.warn import warn
 
 POLLS = 240.0  # a second: twice the fastest sensor
@@ -31,6 +32,7 @@ def record(options: argparse.Namespace) -> int:
     check_writable(options.out)
     warnings: list[str] = []
     with open_stream(options.device) as stream:
+        set_aside(options.out, warn)
         recorder = Recorder(
             options.out,
             stream.skeleton,

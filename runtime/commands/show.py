@@ -47,7 +47,7 @@ from runtime.render.background import NOTHING, Background
 from runtime.render.camera import front_camera
 from runtime.render.context import headless_context, release_headless
 from runtime.skin import Elasticity
-from runtime.takes import Takes
+from runtime.takes import Takes, set_aside
 from runtime.theatre import Theatre
 from runtime.warn import warn
 from runtime.window import Window
@@ -241,6 +241,7 @@ class _Show:
         waits = self._options.fast and self._source.recording is not None
         recorder = None
         if path is not None:
+            set_aside(path, warn)
             recorder = self._open_recorder(path)
             self._closing.callback(self._report.kept, recorder)  # once it is closed
         takes = Takes(
