@@ -16,6 +16,7 @@ from runtime.clock import StageTimer
 from runtime.conditioning.reception import Reception
 from runtime.conditioning.switches import Conditioning, filled_only
 from runtime.director import Director
+from runtime.easing import Easing
 from runtime.ensemble import Act
 from runtime.lead import Lead
 from runtime.output.output import Output, PerformedFrame, Screen
@@ -46,7 +47,7 @@ class FrameLoop:
 
     Attributes:
         frozen: whether the characters hold still, while frames go on to come, to be recorded and
-            to be published.
+            to be published; let go, they ease to where their performers are by then.
         frames: frames performed so far.
         received: frames that came so far.
         seconds: performer's time from the first of them to the last [s].
@@ -76,6 +77,7 @@ class FrameLoop:
         self._began = float("nan")
         self._stream = stream
         self._acts = (Act(performer, puppets, director), *others)
+        self._easings = [Easing(act.performer.skeleton) for act in self._acts]
         self._report = report
         self._theatre = theatre
         self._outputs = outputs
@@ -162,8 +164,10 @@ class FrameLoop:
                     if not self.frozen:
                         act.director.direct(parts[part])
             if self.frozen:
+                self._easings[part].hold(frame.time)
                 continue
-            pose = self._poses[part]
+            with timer.stage("retarget"):
+                pose = self._eased(part, frame.time)
             for puppet in act.puppets:
                 with timer.stage("retarget"):
                     if pose is not None:
@@ -177,6 +181,13 @@ class FrameLoop:
         self._began = frame.time if self.frames == 0 else self._began
         self.seconds = frame.time - self._began
         self.frames += 1
+
+    def _eased(self, part: int, time: float) -> Pose | None:
+        """What the puppets of a part follow at `time` [s]: its performer's pose, or on its way."""
+        pose, puppets = self._poses[part], self._acts[part].puppets
+        if pose is None:
+            return None
+        return self._easings[part].follow(pose, time, [puppet.source_rest for puppet in puppets])
 
     def _publish(self, frame: SkeletonFrame) -> None:
         at, step = frame.time, self._picture_step
