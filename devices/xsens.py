@@ -1,11 +1,12 @@
-"""Xsens MVN's network streamer: ``xsens://127.0.0.1:9763``, poses of a whole suit by UDP.
+"""Xsens MVN's network streamer: ``xsens://127.0.0.1:9763``, poses of a whole suit by UDP or TCP.
 
-Datagrams are big-endian. Of their kinds, MXTP02 (positions and quaternions) and MXTP01 (positions
-and Euler angles) hold a pose; a pose that is too long for one datagram comes in several. MVN's
-world is right-handed, Z up (``?up=y`` where MVN was told so), the suit's X forward at calibration;
-in MXTP01 it is Y up, Z forward. Positions are metres or centimetres, as versions differ; the size
-of the body tells. In which order MXTP01's angles are to be applied is not specified, so its
-rotations are left unknown.
+MVN is told where to send; by TCP (``?transport=tcp``) it connects to us, and the same datagrams
+come one after another. They are big-endian. Of their kinds, MXTP02 (positions and quaternions) and
+MXTP01 (positions and Euler angles) hold a pose; a pose that is too long for one datagram comes in
+several. MVN's world is right-handed, Z up (``?up=y`` where MVN was told so), the suit's X forward
+at calibration; in MXTP01 it is Y up, Z forward. Positions are metres or centimetres, as versions
+differ; the size of the body tells. In which order MXTP01's angles are to be applied is not
+specified, so its rotations are left unknown.
 
 Source: MVN real-time network streaming protocol specification, section 2.
 """
@@ -24,6 +25,7 @@ from devices.address import host_and_port, one_of, options_of
 from devices.clock_map import STEP_BACK, ClockMap
 from devices.live_stream import LiveStream
 from devices.skeleton import SkeletonFrame
+from devices.tcp import Framing, TcpTransport
 from devices.udp import UdpTransport
 from devices.xsens_segments import BODY, FINGERS_A_HAND, xsens_skeleton
 
@@ -232,6 +234,21 @@ def _datagram(data: bytes) -> _Datagram | None:
     return _Datagram(tag, counter, number, last, time * 1e-3, who, props, segments)
 
 
+def datagram_length(head: bytes) -> int | None:
+    """Bytes of the datagram that begins with `head`, its 24 bytes of header; None if it is none.
+
+    MVN left the size of the payload empty before the protocol had one; the items of a pose tell it.
+    """
+    tag, _, _, count, _, _, _, _, _, _, size = HEADER.unpack(head)
+    if tag[:4] != b"MXTP" or not tag[4:].isdigit():
+        return None
+    layout = _SEGMENTS.get(tag)
+    if layout is None:
+        return HEADER.size + size if size else None
+    items = count * layout.itemsize
+    return HEADER.size + items if size in (0, items) else None
+
+
 def _size(positions: Array) -> float:
     """How far a body's segments are from its middle, in the median; 0 where too few are seen."""
     seen = positions[np.isfinite(positions).all(axis=1)]
@@ -257,14 +274,24 @@ def _joint_numbers(
 
 
 def open_device(address: SplitResult) -> LiveStream:
-    """Listen at ``xsens://HOST:PORT?fingers=on|off&up=z|y``.
+    """Listen at ``xsens://HOST:PORT?transport=udp|tcp&fingers=on|off&up=z|y``.
 
     Raises:
         InputError: the port is taken, or an option is not known.
     """
-    options = options_of(address, {"fingers": one_of("on", "off"), "up": one_of(*_AXES)})
+    known = {
+        "transport": one_of("udp", "tcp"),
+        "fingers": one_of("on", "off"),
+        "up": one_of(*_AXES),
+    }
+    options = options_of(address, known)
     host, port = host_and_port(address, PORT)
-    transport = UdpTransport(host, port, scheme=address.scheme)
+    transport: UdpTransport | TcpTransport
+    if options.get("transport") == "tcp":
+        framing = Framing("MXTP", HEADER.size, datagram_length)
+        transport = TcpTransport(host, port, scheme=address.scheme, framing=framing)
+    else:
+        transport = UdpTransport(host, port, scheme=address.scheme)
     return LiveStream(
         transport,
         lambda: XsensDecoder(fingers=options.get("fingers") == "on", up=options.get("up", "z")),

@@ -17,6 +17,7 @@ ADDRESSES = {
     "nimate": "nimate://127.0.0.1:0",
     "rokoko": "rokoko://127.0.0.1:0",
     "xsens": "xsens://127.0.0.1:0",
+    "xsens by TCP": "xsens://127.0.0.1:0?transport=tcp",
     "mediapipe": "mediapipe://127.0.0.1:0",
     "kinect": "kinect://v2",
     "leap": "leap://",
@@ -29,12 +30,16 @@ NEEDS_A_DEVICE = {"kinect", "leap", "zmq+tcp"}
 """Those that may find nothing at their address; they then say so in one line."""
 
 
+WAYS = (*ADAPTERS, "xsens by TCP")
+"""Every adapter, and by every transport that it has."""
+
+
 def address(scheme: str) -> str:
     assert scheme in ADDRESSES, f"give {scheme}:// an address in tests/devices/test_adapters.py"
     return ADDRESSES[scheme]
 
 
-@pytest.fixture(params=ADAPTERS)
+@pytest.fixture(params=WAYS)
 def stream(request: pytest.FixtureRequest) -> Iterator[SkeletonStream]:
     url = address(request.param)
     try:
@@ -71,7 +76,7 @@ def test_it_closes_twice_and_has_then_ended(stream: SkeletonStream) -> None:
     assert stream.ended
 
 
-@pytest.mark.parametrize("scheme", sorted(set(ADAPTERS) - {"sim"}))
+@pytest.mark.parametrize("scheme", sorted(set(WAYS) - {"sim"}))
 def test_an_option_that_it_does_not_know_is_refused_in_one_line(scheme: str) -> None:
     url = address(scheme)
     with pytest.raises(InputError, match=re.escape("'no_such_option'")) as refused:
