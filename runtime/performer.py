@@ -45,6 +45,7 @@ class Pose:
         scaled: whether lengths were made those of the skeleton's rest pose.
         scale: what they were multiplied by.
         time: [s] when; nan where it does not matter.
+        performer: the number of who it is.
     """
 
     seen: Array
@@ -58,6 +59,7 @@ class Pose:
     scaled: bool = False
     scale: float = 1.0
     time: float = float("nan")
+    performer: int = 0
 
     def facing(self, heading: float) -> Array:
         """Every joint (J, 3) [m], the whole body turned so that it has this heading [rad]."""
@@ -145,6 +147,7 @@ class Performer:
             scaled=whole.scaled,
             scale=whole.scale,
             time=frame.time,
+            performer=frame.performer,
         )
         return self.pose
 

@@ -64,7 +64,7 @@ def check_outputs(options: argparse.Namespace) -> None:
 def open_outputs(
     options: argparse.Namespace,
     cast: Sequence[tuple[Character, Part]],
-    performer: Performer,
+    performers: Sequence[Performer],
     rate: float,
     closing: ExitStack,
 ) -> list[list[Output]]:
@@ -73,7 +73,7 @@ def open_outputs(
     Args:
         options: of the command line.
         cast: the characters, each with its part of the report.
-        performer: who drives them.
+        performers: who drive them, the lead first.
         rate: about how many frames a second will come.
         closing: closes what was opened.
 
@@ -99,11 +99,12 @@ def open_outputs(
     for broadcast in _open_broadcasts(options):
         outputs[0].append(closing.enter_context(broadcast))
     if options.publish is not None:
-        publisher = open_publisher(_publishing(options), performer.skeleton)
-        outputs[0].append(closing.enter_context(BridgePerformer(performer, publisher)))
+        publisher = open_publisher(_publishing(options), performers[0].skeleton)
+        outputs[0].append(closing.enter_context(BridgePerformer(performers, publisher)))
     if options.vmc is not None:
         host, port = options.vmc
-        outputs[0].append(closing.enter_context(VmcPerformer(performer, host, port or VMC_PORT)))
+        lead = VmcPerformer(performers[0], host, port or VMC_PORT)
+        outputs[0].append(closing.enter_context(lead))
     return outputs
 
 

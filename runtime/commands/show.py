@@ -205,6 +205,7 @@ class _Show:
             (puppet.character, part)
             for puppet, part in zip(self._puppets, self._parts, strict=True)
         ]
+        performers = [act.performer for act in self._acts]
         loop = FrameLoop(
             self._stream,
             self._acts[0].performer,
@@ -213,9 +214,7 @@ class _Show:
             others=self._acts[1:],
             report=self._report,
             theatre=self._theatre,
-            outputs=open_outputs(
-                self._options, cast, self._performer, self._source.rate, self._closing
-            ),
+            outputs=open_outputs(self._options, cast, performers, self._source.rate, self._closing),
             conditioning=self._conditioning,
             shown=self._window is not None,
         )

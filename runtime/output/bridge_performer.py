@@ -1,10 +1,10 @@
-"""The performer of a show for other shows: what drives the characters, over a bridge."""
+"""The performers of a show for other shows: what drives the characters, over a bridge."""
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Self
 
 import numpy as np
@@ -20,10 +20,11 @@ FAR = 60.0  # [s] from the host's clock; a time further off is a recording's own
 
 
 class BridgePerformer:
-    """An output that publishes each pose of the performer, whatever character follows it.
+    """An output that publishes each pose of each performer, whatever characters follow them.
 
     Args:
-        performer: whose poses they are, put in order and without gaps.
+        performers: whose poses they are, put in order and without gaps; all of one skeleton. Each
+            pose goes under its performer's number.
         publisher: is closed with this.
         clock: host monotonic time [s]; a show that is not on it, as fast as it can, is moved there.
     """
@@ -32,34 +33,36 @@ class BridgePerformer:
 
     def __init__(
         self,
-        performer: Performer,
+        performers: Sequence[Performer],
         publisher: BridgePublisher,
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
-        self._performer = performer
+        self._performers = performers
         self._publisher = publisher
         self._clock = clock
         self._shift = math.nan
-        self._last: Pose | None = None
+        self._last: list[Pose | None] = [None] * len(performers)
 
     def write(self, frame: PerformedFrame) -> None:
-        """Publish the performer's pose at this frame, if it is another than the last."""
-        pose = self._performer.pose
-        if pose is None or pose is self._last:
-            return
-        self._last = pose
+        """Publish the poses that are others than at the last frame, the oldest first."""
+        poses = [performer.pose for performer in self._performers]
+        pairs = zip(poses, self._last, strict=True)
+        fresh = [pose for pose, last in pairs if pose is not None and pose is not last]
+        self._last = poses
         now = self._clock()
-        if math.isnan(self._shift):
+        if fresh and math.isnan(self._shift):
             away = now - frame.time
             self._shift = away if abs(away) > FAR else 0.0
-        self._publisher.write(
-            SkeletonFrame(
-                time=min(frame.time + self._shift, now),
-                positions=pose.seen,
-                rotations=None,
-                confidence=np.where(pose.filled | pose.corrected, GUESSED, 1.0),
+        for pose in sorted(fresh, key=lambda pose: pose.time):
+            self._publisher.write(
+                SkeletonFrame(
+                    time=min(pose.time + self._shift, now),
+                    positions=pose.seen,
+                    rotations=None,
+                    confidence=np.where(pose.filled | pose.corrected, GUESSED, 1.0),
+                    performer=pose.performer,
+                )
             )
-        )
 
     def close(self) -> None:
         """Publish no more; may be called twice."""

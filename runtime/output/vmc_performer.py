@@ -31,7 +31,7 @@ class VmcPerformer:
     who listens.
 
     Args:
-        performer: whose pose it is.
+        performer: whose pose it is; the protocol knows one at a port.
         host, port: where the marionette listens.
 
     Attributes:

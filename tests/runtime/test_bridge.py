@@ -473,10 +473,10 @@ def test_ctrl_c_ends_a_bridge_with_a_word_on_what_it_did(tmp_path: Path) -> None
     assert "Traceback" not in said
 
 
-def test_a_show_publishes_its_performer_to_another(tmp_path: Path) -> None:
+def test_a_show_publishes_its_performers_to_another(tmp_path: Path) -> None:
     show = bunraku(
-        *("live", "--device", "sim://walk", "--character", "paper", "--headless"),
-        *("--publish", ANYWHERE),
+        *("live", "--device", "sim://walk?performers=2", "--performers", "2", "--headless"),
+        *("--character", "paper", "--character", "paper", "--publish", ANYWHERE),
         folder=tmp_path,
     )
     try:
@@ -487,7 +487,7 @@ def test_a_show_publishes_its_performer_to_another(tmp_path: Path) -> None:
         show.kill()
         show.communicate()
     heard = read_recording(out)
-    assert len(heard) >= 2
+    assert set(heard.performers.tolist()) == {0, 1}
     assert "HandLeft" in heard.skeleton.names
     assert np.isfinite(heard.positions).all()
 
