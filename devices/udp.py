@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-import errno
 import socket
 import struct
 import threading
 import time
 
-from devices.errors import InputError
+from devices.bound_socket import bound_socket
 from devices.live_stream import Deliver
-from devices.port_owner import port_owner
 
 LONGEST = 65535  # bytes of a datagram
 QUEUE = 4 << 20  # bytes of unread datagrams that the kernel is asked to keep
 WAIT = 0.1  # [s] after which the reader looks whether it is closed
 SLICE = 0.004  # [s] of work without a pause after which the reader pauses for as long
 IDLE = 0.0002  # [s] of waiting for a datagram that count as a pause
-PORTS_TO_TRY = 20
 _AT_ONCE = getattr(socket, "MSG_DONTWAIT", 0)
 _OVERFLOW = 40  # Linux: SO_RXQ_OVFL, each datagram comes with how many were lost before it
 
@@ -49,7 +46,7 @@ class UdpTransport:
     def __init__(self, host: str, port: int, *, scheme: str) -> None:
         self.dropped = 0
         self._closing = threading.Event()
-        self._socket = _bound(host, port, scheme)
+        self._socket = bound_socket(host, port, protocol="udp", scheme=scheme)
         self.host, self.port = self._socket.getsockname()[:2]
         self._socket.settimeout(WAIT)
         self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, QUEUE)
@@ -105,50 +102,3 @@ class UdpTransport:
             if (level, kind, len(value)) == (socket.SOL_SOCKET, _OVERFLOW, 4):
                 (self.dropped,) = struct.unpack("=I", value)
         return data, source[:2]
-
-
-def _bound(host: str, port: int, scheme: str) -> socket.socket:
-    """A socket bound to host and port."""
-    where = f"{scheme}://{host}:{port}"
-    try:
-        family, _, _, _, target = socket.getaddrinfo(host, port, type=socket.SOCK_DGRAM)[0]
-    except (OSError, UnicodeError):
-        raise InputError(
-            f"cannot open {where}: no host is called {host!r}; "
-            "use 127.0.0.1, 0.0.0.0, or this machine's own address"
-        ) from None
-    bound = socket.socket(family, socket.SOCK_DGRAM)
-    try:
-        bound.bind(target)
-    except OSError as error:
-        bound.close()
-        raise InputError(f"cannot open {where}: {_reason(error, host, port, scheme)}") from None
-    return bound
-
-
-def _reason(error: OSError, host: str, port: int, scheme: str) -> str:
-    if error.errno == errno.EADDRINUSE:
-        owner = port_owner(port)
-        holder = f"{owner.name} (process {owner.process})" if owner else "another program"
-        other = _free_port(host, port)
-        use = f"use another port, e.g. {scheme}://{host}:{other}" if other else "use another port"
-        return f"UDP port {port} is taken by {holder}; close it, or {use}"
-    if error.errno == errno.EADDRNOTAVAIL:
-        return f"{host} is no address of this machine; use 127.0.0.1, or 0.0.0.0 for all of them"
-    if error.errno == errno.EACCES:
-        return f"UDP port {port} needs more rights than this user has; use one from 1024"
-    return f"{error.strerror or error}; use another port or host"
-
-
-def _free_port(host: str, port: int) -> int | None:
-    """The next port that can be bound."""
-    for candidate in range(port + 1, min(port + 1 + PORTS_TO_TRY, 65536)):
-        with socket.socket(
-            socket.AF_INET6 if ":" in host else socket.AF_INET, socket.SOCK_DGRAM
-        ) as trial:
-            try:
-                trial.bind((host, candidate))
-            except OSError:
-                continue
-            return candidate
-    return None

@@ -134,7 +134,6 @@ def watch(addresses: Sequence[str], seconds: float) -> list[Watch]:
 
 def _watch(address: str, seconds: float, stop: threading.Event) -> Watch:
     seen = Watch(address)
-    until = time.perf_counter() + seconds
     try:
         stream = open_stream(_patient(urlsplit(address), seconds))
     except InputError as error:
@@ -144,6 +143,7 @@ def _watch(address: str, seconds: float, stop: threading.Event) -> Watch:
         if traffic is None:
             seen.state, seen.detail = State.READY, "always there, 60 frames a second"
             return seen
+        until = time.perf_counter() + seconds  # opening has its own time
         while not stop.wait(min(GLANCE, max(until - time.perf_counter(), 0.0))):
             _look(seen, stream)
             if time.perf_counter() >= until:
@@ -171,7 +171,8 @@ def _closed(seen: Watch, reason: str) -> Watch:
     seen.state, seen.detail = State.MISSING, reason.partition(": ")[2] or reason
     port = port_of(seen.address)
     if address.scheme in LISTENS and port and f"{port} is taken" in reason:
-        seen.state, seen.owner = State.TAKEN, port_owner(port)
+        seen.state = State.TAKEN
+        seen.owner = port_owner(port, "tcp" if "transport=tcp" in address.query else "udp")
     elif address.netloc == "webcam" and find_spec("mediapipe") is None:
         seen.detail = "a webcam needs the extra: pip install 'bunraku[mediapipe]'"
     elif address.scheme == "zmq+tcp" and "no bridge answers" in reason:

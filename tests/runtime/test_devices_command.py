@@ -149,12 +149,20 @@ def test_silence_is_told(port: int, capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @linux_only
-def test_a_taken_port_names_who_has_it(capsys: pytest.CaptureFixture[str]) -> None:
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as holder:
+@pytest.mark.parametrize(
+    ("kind", "query"), [(socket.SOCK_DGRAM, ""), (socket.SOCK_STREAM, "?transport=tcp")]
+)
+def test_a_taken_port_names_who_has_it(
+    kind: socket.SocketKind, query: str, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    with socket.socket(socket.AF_INET, kind) as holder:
         holder.bind(("127.0.0.1", 0))
-        address = f"xsens://127.0.0.1:{holder.getsockname()[1]}"
-        code, text, _ = told(capsys, "devices", address, "--seconds", 0.1)
+        if kind is socket.SOCK_STREAM:
+            holder.listen()
+        address, found = f"xsens://127.0.0.1:{holder.getsockname()[1]}{query}", tmp_path / "d.json"
+        code, text, _ = told(capsys, "devices", address, "--seconds", 0.1, "--json", found)
     assert code == 0
+    assert f'"process": {os.getpid()}' in found.read_text(encoding="utf-8")
     assert text.startswith(f"taken      {address}")
     assert f"(process {os.getpid()})" in text
 
