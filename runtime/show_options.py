@@ -197,12 +197,12 @@ def _add_other_programs(parser: argparse.ArgumentParser) -> None:
         "--vmc",
         type=host_port,
         metavar="HOST:PORT",
-        help="send the performer as VMC; its receivers listen on port 39539",
+        help="send the lead performer as VMC; its receivers listen on port 39539",
     )
     send.add_argument(
         "--publish",
         metavar="tcp://HOST:PORT",
-        help="the performer for other shows, which open zmq+tcp://HOST:PORT",
+        help="the performers for other shows, which open zmq+tcp://HOST:PORT",
     )
     send.add_argument(
         "--publish-keys",
