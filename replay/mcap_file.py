@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
+import orjson
 from mcap.records import Channel, Chunk, Message, Metadata
 from numpy.typing import NDArray
 
@@ -103,16 +104,16 @@ def decode_skeleton(text: str | bytes) -> Skeleton:
 def encode_frame(frame: SkeletonFrame) -> bytes:
     """The JSON of a frame; what is not finite becomes null."""
     fields = {
-        "time": frame.time,
-        "arrival": frame.arrival,
-        "performer": frame.performer,
-        "positions": _finite(frame.positions),
-        "confidence": frame.confidence.tolist(),
+        "time": float(frame.time),
+        "arrival": float(frame.arrival),
+        "performer": int(frame.performer),
+        "positions": np.ascontiguousarray(frame.positions),
+        "confidence": np.ascontiguousarray(frame.confidence),
     }
     if frame.rotations is not None:
-        fields["rotations"] = _finite(frame.rotations)
-    # Only numbers and the names above are in the text, so the word NaN can mean nothing else.
-    return json.dumps(fields, separators=(",", ":")).replace("NaN", "null").encode()
+        fields["rotations"] = np.ascontiguousarray(frame.rotations)
+    # Twenty times as fast as json, which would keep the interpreter from a show that goes on.
+    return orjson.dumps(fields, option=orjson.OPT_SERIALIZE_NUMPY)
 
 
 def decode_frame(data: bytes, joints: int) -> SkeletonFrame:
@@ -138,10 +139,6 @@ def decode_frame(data: bytes, joints: int) -> SkeletonFrame:
         )
     except (*_BAD_JSON, AttributeError) as error:
         raise DamagedRecordError("a message is not a whole frame") from error
-
-
-def _finite(values: NDArray[np.float64]) -> list[Any]:
-    return np.where(np.isfinite(values), values, np.nan).tolist()  # type: ignore[no-any-return]
 
 
 def _finite_number(value: Any) -> float:
