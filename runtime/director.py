@@ -77,6 +77,8 @@ class Director:
         self._targets = [TargetHierarchy(puppet.tree, puppet.root) for puppet in puppets]
         self._shown = [MatchHysteresis(choices.rank - 1) for _ in puppets]
         self._source = simplify(performer.rest_tree())
+        for target in self._targets:  # so that no frame waits for what it has to load
+            target.rank(self._source, np.eye(3), limit=1)
         self._since = float("nan")
         self._before: Pose | None = None
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import min_weight_full_bipartite_matching
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -28,15 +30,14 @@ def associate(distance: Array, same_name: Bools, within: Bools) -> NDArray[np.in
     Returns:
         (D,) index of the known one, or -1 for somebody new.
     """
-    # Loading SciPy's optimisation takes longer than most of a show's start, and few need it.
-    from scipy.optimize import linear_sum_assignment  # noqa: PLC0415
-
     detections, known = distance.shape
     cost = np.full((detections, known + detections), 1e6)
     named = np.minimum(distance, FURTHEST) - LOYALTY
     cost[:, :known] = np.where(same_name, named, np.where(within, distance, 1e6))
     cost[:, known:] = STRANGER
-    rows, columns = linear_sum_assignment(cost)
+    # Not by scipy.optimize, which takes 0.3 s to load. Here no cost may be zero, since that is no
+    # edge; every detection has one partner, so what is added to all costs changes nothing.
+    rows, columns = min_weight_full_bipartite_matching(csr_array(cost + 2.0 * LOYALTY))
     out = np.full(detections, -1, dtype=np.int64)
     out[rows] = np.where(columns < known, columns, -1)
     return out

@@ -28,6 +28,7 @@ from runtime.interrupt import held
 from runtime.loop import FrameLoop
 from runtime.output.report import Report
 from runtime.pacing import OnArrival
+from runtime.pauses import long_lived
 from runtime.performer import Performer, Pose
 from runtime.puppet import Motion, Puppet
 from runtime.render.context import headless_context, is_software, release_headless
@@ -119,6 +120,7 @@ def measured(
             sender = closing.enter_context(_sender(way, rate, count, str(udp.port)))
         show = _Show(context, _Noted(stream), drawn=drawn)
         closing.callback(show.theatre.close)
+        closing.enter_context(long_lived())
         _say(sender, "go")
         show.perform(count)
     return show.times(count, skipped=round(rate * WARM_UP))

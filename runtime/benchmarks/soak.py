@@ -24,6 +24,7 @@ from runtime.conditioning.switches import for_live
 from runtime.director import Choices, Director
 from runtime.loop import FrameLoop
 from runtime.output.report import Report
+from runtime.pauses import long_lived
 from runtime.performer import Performer
 from runtime.puppet import Puppet
 from runtime.render.camera import front_camera
@@ -115,16 +116,17 @@ def soaked(path: Path, seconds: float, *, real_time: bool) -> Soak:
         log = _Log(recorder.offer if real_time else recorder.write, 2 * ticks * PERFORMERS)
         loop = _loop(RecordedStream(stream, log.note))
         ticker = Ticker(RATE)
-        for tick in range(ticks):
-            began = time.perf_counter()
-            loop.tick()
-            loop.settle()
-            spent[tick] = time.perf_counter() - began
-            if tick % TICKS_A_SAMPLE == 0:
-                memory[tick // TICKS_A_SAMPLE] = resident_memory()
-            clock.now = (tick + 1) / RATE
-            if real_time:
-                ticker.wait()
+        with long_lived():
+            for tick in range(ticks):
+                began = time.perf_counter()
+                loop.tick()
+                loop.settle()
+                spent[tick] = time.perf_counter() - began
+                if tick % TICKS_A_SAMPLE == 0:
+                    memory[tick // TICKS_A_SAMPLE] = resident_memory()
+                clock.now = (tick + 1) / RATE
+                if real_time:
+                    ticker.wait()
     return Soak(log.count, log.found_in(path), spent, memory)
 
 

@@ -37,6 +37,7 @@ from runtime.loop import FrameLoop
 from runtime.mapping import Mapping, read_mapping
 from runtime.output.report import MatchedPair, Report
 from runtime.pacing import TICKS, pace_of
+from runtime.pauses import long_lived
 from runtime.performer import Performer
 from runtime.progress import Progress
 from runtime.provenance import provenance
@@ -184,6 +185,7 @@ class _Show:
         if self._window is not None and self._theatre is not None:
             controls = Controls(self._window, self._theatre, desk)
         pace = None if options.fast else pace_of(self._source.stream)
+        self._closing.enter_context(long_lived())
         while not (self._stream.ended or desk.leaving):
             with held():  # so that all outputs have the same frames
                 performed = loop.tick()

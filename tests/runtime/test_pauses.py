@@ -1,0 +1,37 @@
+"""What is loaded before a show does not make it pause."""
+
+from __future__ import annotations
+
+import gc
+import weakref
+
+import pytest
+
+from runtime.pauses import long_lived
+
+
+class Ring:
+    """Garbage that only the collector can find."""
+
+    def __init__(self) -> None:
+        self.itself = self
+
+
+def test_what_was_there_is_left_alone_and_what_comes_is_collected() -> None:
+    before = Ring()
+    old = weakref.ref(before)
+    with long_lived():
+        del before
+        new = weakref.ref(Ring())
+        gc.collect()
+        assert old() is not None
+        assert new() is None
+    gc.collect()
+    assert old() is None
+
+
+def test_a_show_that_fails_leaves_the_collector_as_it_was() -> None:
+    frozen = gc.get_freeze_count()
+    with pytest.raises(KeyboardInterrupt), long_lived():
+        raise KeyboardInterrupt
+    assert gc.get_freeze_count() == frozen == 0
