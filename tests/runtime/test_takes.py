@@ -32,10 +32,10 @@ def test_a_second_take_under_the_same_name_leaves_the_first(
 def test_nothing_is_set_aside_that_is_no_take(tmp_path: Path) -> None:
     told: list[str] = []
     (tmp_path / "empty.mcap").touch()
-    for name in ("absent.mcap", "empty.mcap"):
+    (tmp_path / "folder.mcap").mkdir()
+    for name in ("absent.mcap", "empty.mcap", "folder.mcap"):
         set_aside(tmp_path / name, told.append)
-    set_aside(Path("/dev/null"), told.append)
-    assert [path.name for path in tmp_path.iterdir()] == ["empty.mcap"]
+    assert {path.name for path in tmp_path.iterdir()} == {"empty.mcap", "folder.mcap"}
     assert told == []
 
 
