@@ -27,7 +27,6 @@ from mcap.records import (
     Footer,
     Header,
     McapRecord,
-    Message,
     MessageIndex,
     Metadata,
     MetadataIndex,
@@ -39,6 +38,8 @@ from mcap.records import (
 from replay.mcap_records import MAGIC
 
 CHUNK_BYTES = 1 << 20
+_MESSAGE = struct.Struct("<BQHIQQ")  # its head: opcode, size, channel, sequence, two times
+_OPCODE_AND_SIZE = 9  # bytes, which a record's size leaves out
 _ZSTD_LEVEL = 1  # on frames in JSON both smaller and faster than the usual 3
 
 
@@ -66,7 +67,10 @@ class McapSink:
         self._chunk_index = bytearray()
         self._chunks = self._metadatas = 0
         self._times: tuple[int, int] | None = None  # of all messages, first and last [ns]
-        self._records = RecordBuilder()  # of the chunk that is being filled
+        # The records of the chunk that is being filled, and room for more. One room for all
+        # chunks: buffers of ever other sizes would leave holes in the memory of a long show.
+        self._room = bytearray(2 * CHUNK_BYTES)
+        self._filled = 0
         self._entries: dict[int, list[tuple[int, int]]] = {}
         self._chunk_times: tuple[int, int] | None = None
         try:
@@ -98,36 +102,38 @@ class McapSink:
         """Declare a JSON schema; its number."""
         number = len(self._schemas) + 1
         self._schemas.append(Schema(number, text.encode(), "jsonschema", name))
-        self._schemas[-1].write(self._records)
+        self._append(_bytes_of(self._schemas[-1]))
         return number
 
     def channel(self, topic: str, schema: int) -> int:
         """Open a channel of JSON messages; its number."""
         number = len(self._channels) + 1
         self._channels.append(Channel(number, topic, "json", {}, schema))
-        self._channels[-1].write(self._records)
+        self._append(_bytes_of(self._channels[-1]))
         return number
 
     def message(
         self, channel: int, data: bytes, *, log_time: int, publish_time: int, sequence: int
     ) -> None:
         """Append a message to the chunk; times in nanoseconds."""
-        entry = (log_time, self._records.count)
-        self._entries.setdefault(channel, []).append(entry)
-        Message(channel, log_time, data, publish_time, sequence).write(self._records)
+        self._entries.setdefault(channel, []).append((log_time, self._filled))
+        size = _MESSAGE.size - _OPCODE_AND_SIZE + len(data)
+        self._append(_MESSAGE.pack(Opcode.MESSAGE, size, channel, sequence, log_time, publish_time))
+        self._append(data)
         self._chunk_times = _spanning(self._chunk_times, (log_time, log_time))
-        if self._records.count >= CHUNK_BYTES:
+        if self._filled >= CHUNK_BYTES:
             self.flush()
 
     def flush(self) -> None:
         """Hand all messages to the system as one chunk, with its index."""
         if not self._entries:
             return
-        data, entries = _taken_from(self._records), self._entries
+        size, entries = self._filled, self._entries
         start, end = self._chunk_times or (0, 0)
-        self._entries, self._chunk_times = {}, None
-        packed = self._compressor.compress(data)
-        chunk = _bytes_of(Chunk("zstd", packed, end, start, zlib.crc32(data), len(data)))
+        self._filled, self._entries, self._chunk_times = 0, {}, None
+        with memoryview(self._room)[:size] as data:
+            crc, packed = zlib.crc32(data), self._compressor.compress(data)
+        chunk = _bytes_of(Chunk("zstd", packed, end, start, crc, size))
         index, offsets = b"", {}
         for channel, places in entries.items():
             offsets[channel] = self._offset + len(chunk) + len(index)
@@ -148,7 +154,7 @@ class McapSink:
                 message_index_length=len(index),
                 message_index_offsets=offsets,
                 message_start_time=start,
-                uncompressed_size=len(data),
+                uncompressed_size=size,
             )
         )
 
@@ -194,6 +200,11 @@ class McapSink:
             schema_count=len(self._schemas),
         )
 
+    def _append(self, record: bytes) -> None:
+        end = self._filled + len(record)
+        self._room[self._filled : end] = record  # which makes more room where there is too little
+        self._filled = end
+
     def _write(self, data: bytes) -> None:
         """All of `data`, or nothing of it and an OSError."""
         view = memoryview(data)
@@ -211,11 +222,6 @@ class McapSink:
 def _bytes_of(record: McapRecord) -> bytes:
     builder = RecordBuilder()
     record.write(builder)
-    return _taken_from(builder)
-
-
-def _taken_from(builder: RecordBuilder) -> bytes:
-    """What was built; the builder is empty afterwards."""
     data: bytes = builder.end()  # type: ignore[no-untyped-call]
     return data
 
