@@ -12,7 +12,7 @@ from runtime.characters.proxy import proxy_of
 from solvers.arap_cells import SPOKES
 from solvers.articulation import articulate
 from solvers.binding import bind
-from solvers.edges import unique_edges
+from solvers.edges import edge_lengths, stretch, unique_edges
 from solvers.handles import HARD, group_targets, stretched_turns
 from solvers.squash_stretch import SquashStretchSolver
 from solvers.tree import Tree
@@ -76,8 +76,7 @@ class Skin:
         self.rest = proxy.vertices
         self.edges = unique_edges(proxy.vertices, proxy.faces)
         self.notes = proxy.notes
-        ends = self.rest[self.edges]
-        self._rest_lengths = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
+        self._rest_lengths = edge_lengths(self.rest, self.edges)
         bone_of_vertex = _bones_of_weights(character, proxy.kept, tree.parents)
         self.binding = bind(
             proxy.vertices, proxy.faces, tree.parents, tree.positions, bone_of_vertex
@@ -167,10 +166,7 @@ class Skin:
 
     def stretch(self, deformed: Array) -> Array:
         """Relative change of length (E,) of the edges of the deformed surface (C, 3) [m]."""
-        ends = deformed[self.edges]
-        lengths = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
-        change: Array = np.abs(lengths / self._rest_lengths - 1.0)
-        return change
+        return stretch(deformed, self.edges, self._rest_lengths)
 
 
 def _bones_of_weights(character: Character, kept: Indices, parents: Indices) -> Indices | None:

@@ -21,7 +21,7 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import KDTree
 
-from solvers.edges import unique_edges
+from solvers.edges import edge_lengths, unique_edges
 from solvers.limbs import closest_bones, limbs
 
 SEGMENT = 2.5  # the least length of a segment, in radii of its limb
@@ -178,7 +178,7 @@ def _turns(points: Array, along: Array, radius: float) -> Array:
 
 def _edge_graph(vertices: Array, faces: Indices) -> csr_array:
     edges = unique_edges(vertices, faces)
-    lengths = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
+    lengths = edge_lengths(vertices, edges)
     rows, columns = np.concatenate([edges, edges[:, ::-1]]).T
     count = len(vertices)
     return coo_array((np.tile(lengths, 2), (rows, columns)), shape=(count, count)).tocsr()

@@ -28,7 +28,7 @@ from runtime.rehearsal import rehearse
 from runtime.render.camera import front_camera
 from solvers.arap import ArapSolver
 from solvers.decimation import decimate
-from solvers.edges import unique_edges
+from solvers.edges import edge_lengths, unique_edges
 
 SIZES = (10_000, 20_000, 40_000, 100_000, 160_000, 300_000)
 FRAMES = 100
@@ -178,7 +178,7 @@ class Comparison:
     def __init__(self, vertices: Floats, faces: Ints) -> None:
         self._rest, self._faces = vertices, faces
         self._edges = unique_edges(vertices, faces)
-        self._lengths = _lengths(vertices, self._edges)
+        self._lengths = edge_lengths(vertices, self._edges)
         self._size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
 
     def figures(self, found: Floats, full: Floats) -> Figures:
@@ -202,7 +202,7 @@ class Comparison:
         }
 
     def _stretch(self, vertices: Floats) -> float:
-        ratio = _lengths(vertices, self._edges) / self._lengths
+        ratio = edge_lengths(vertices, self._edges) / self._lengths
         return float(np.percentile(np.abs(ratio - 1.0), 99.0))
 
     def _normals(self, vertices: Floats) -> Floats:
@@ -216,11 +216,6 @@ class Comparison:
                 )
         lengths = np.linalg.norm(normals, axis=1, keepdims=True)
         return np.asarray(normals / np.maximum(lengths, 1e-300))
-
-
-def _lengths(vertices: Floats, edges: Ints) -> Floats:
-    along = vertices[edges[:, 0]] - vertices[edges[:, 1]]
-    return np.asarray(np.linalg.norm(along, axis=1))
 
 
 def _over_all(figures: Sequence[Figures]) -> Figures:

@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from solvers.edges import unique_edges
+from solvers.edges import edge_lengths, unique_edges
 
 _BIN = 1e-4  # width of a bin: what p99 is exact to
 _BINS = 100_000  # so stretches up to 10 are told apart; all above count as 10
@@ -25,14 +25,12 @@ class StretchStatistic:
     """
 
     def __init__(self, vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
-        edges = unique_edges(vertices, faces)
-        lengths = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
-        self._edges = np.ascontiguousarray(edges)
-        self._inverse_lengths = 1 / lengths
+        rest = np.ascontiguousarray(vertices, np.float64)
+        self._edges = unique_edges(rest, faces)
+        self._inverse_lengths = 1.0 / edge_lengths(rest, self._edges)
         self._histogram = np.zeros(_BINS + 1, np.int64)
         self._sum = 0.0
         # Compiles now, or loads what an earlier run compiled, and not within the first frame.
-        rest = np.ascontiguousarray(vertices, np.float64)
         _accumulate(rest, self._edges, self._inverse_lengths, np.zeros_like(self._histogram))
 
     def add(self, vertices: NDArray[np.float64]) -> None:

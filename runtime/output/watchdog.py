@@ -12,7 +12,7 @@ from runtime.output.energy_histogram import EnergyHistogram
 from solvers.arap_cells import SPOKES, build_cells
 from solvers.arap_kernels import fit_cells
 from solvers.compiled import kernel, most_threads, threads_for
-from solvers.edges import unique_edges
+from solvers.edges import edge_lengths, unique_edges
 from solvers.laplacian import half_cotangents
 from solvers.rotation_fit import SCRATCH
 
@@ -71,8 +71,7 @@ class Watchdog:
     def __init__(self, vertices: Array, faces: Indices) -> None:
         rest = np.ascontiguousarray(vertices, np.float64)
         self._edges = unique_edges(rest, faces)
-        lengths = np.linalg.norm(rest[self._edges[:, 0]] - rest[self._edges[:, 1]], axis=1)
-        self._inverse_lengths = 1.0 / lengths
+        self._inverse_lengths = 1.0 / edge_lengths(rest, self._edges)
         self._faces, self._normals, self._areas = _sound(rest, faces)
         self._halves = half_cotangents(rest, self._faces)
         self._cells = build_cells(rest, np.asarray(faces, np.int64), SPOKES).cells
