@@ -108,7 +108,7 @@ class ArapSolver:
         )
         self._R = np.tile(_NO_TURN, (count, 1))
         self._R_aside = self._R.copy()
-        self._frames_since, self._has_moved = 0, False
+        self._frames_since, self._has_moved, self._is_fresh = 0, False, True
         self._laplace_x = np.empty((count, 3))
         self._residual = np.empty((count, 3))
         self._room = np.empty((most_threads(), SCRATCH))
@@ -192,7 +192,7 @@ class ArapSolver:
         """Forget the last answer: the next solve starts from the rest pose."""
         self._x[:] = self._rest
         self._R[:] = _NO_TURN
-        self._frames_since, self._has_moved = 0, False
+        self._frames_since, self._has_moved, self._is_fresh = 0, False, True
         self._goals = self._x[self._handles.places]
 
     def solve(
@@ -309,10 +309,13 @@ class ArapSolver:
             self._try_from_rest(goals, _BETTER)
         elif self._has_moved and self._frames_since > _CHECKED:
             self._try_from_rest(goals, _MUCH_BETTER)
+        self._is_fresh = False
 
     def _try_from_rest(self, goals: Floats, share: float) -> None:
         """Start from the rest pose, moved along, if its energy is under a share of that of x."""
         self._frames_since, self._has_moved = 0, False
+        if self._is_fresh:  # x is that already
+            return
         following, ties = self._following, self._priors.is_on
         whole = following.motions(self._rest[self._handles.places], goals)
         follow(self._rest, following.influences, whole, self._from_rest)
