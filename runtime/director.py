@@ -17,6 +17,7 @@ from devices.skeleton import SkeletonFrame
 from runtime.mapping import Drive, Mapping
 from runtime.performer import Performer, Pose, Rest, rest_state
 from runtime.puppet import STRAIGHT_ON, Body, Puppet, body_of
+from runtime.restraint import restrain
 from solvers.abstraction import simplify
 from solvers.match_hysteresis import MatchHysteresis
 from solvers.matching import SIZE_PREFERENCE, Match, TargetHierarchy
@@ -111,7 +112,7 @@ class Director:
         self.matching = False
         facing = np.array([pose.facing(0.0) - pose.hips for pose in poses])
         tried = [poses[index] for index in most_different(facing, TRIED)]
-        return np.array([puppet.rehearse(tried) for puppet in self._puppets])
+        return np.array([restrain(puppet, tried) for puppet in self._puppets])
 
     def direct(self, frame: SkeletonFrame) -> None:
         """While matching, show the best match of the newest pose; accept it in time."""

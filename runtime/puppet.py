@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,11 +28,7 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 STRAIGHT_ON = np.eye(3)  # how a capture device sees its performer
-MOST_STRETCH = 0.4  # of an edge at the 99th percentile, in a rehearsal
-REHEARSED_ITERATIONS = 4  # poses of a rehearsal lie far apart
-EASY = 0.75  # of that: a pose that stretches less is not tried again
-ROUNDS = 16  # of a rehearsal, at most
-LEAST_STEP = 0.9  # by which a limb is held back in a round
+FROM_REST = 4  # iterations towards a pose from none
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -180,53 +175,28 @@ class Puppet:
                 chain_of[node] = chain_of[self._parents[node]]
         return chain_of
 
-    def rehearse(self, poses: Sequence[Pose]) -> Array:
-        """Go through poses, holding back limbs whose surface cannot follow them.
-
-        A limb that has grown together with the body (an arm and its cape) would tear it when it
-        turns as far as the performer's. Its turns are made smaller, by the same share for the whole
-        show, until the surface is stretched no more than `MOST_STRETCH` at the 99th percentile.
+    def attempt(self, pose: Pose) -> tuple[Array, Array]:
+        """Strike a pose as if none had been struck before.
 
         Returns:
-            (2, 3) [m] least and greatest corner of all that it fills meanwhile, on the stage.
+            (2, 3) [m] least and greatest corner of what it fills on the stage, and (E,) the
+            relative change of length of the edges of `skin`.
         """
-        pulls = self._drives_of_edges()
-        boxes, stretches = zip(*(self._try(pose) for pose in poses), strict=True)
-        corners, stretch = np.array(boxes), np.array(stretches)
-        for _ in range(ROUNDS):
-            if np.percentile(stretch, 99.0) <= MOST_STRETCH:
-                break
-            self._hold_back(stretch, pulls)
-            # Smaller turns stretch no pose more: those that were well within stay so.
-            tight = np.percentile(stretch, 99.0, axis=1) > EASY * MOST_STRETCH
-            for number in np.flatnonzero(tight).tolist():
-                corners[number], stretch[number] = self._try(poses[number])
-        self.skin.reset()
-        self._retargets.reset()
-        return np.array([corners[:, 0].min(axis=0), corners[:, 1].max(axis=0)])
-
-    def _try(self, pose: Pose) -> tuple[Array, Array]:
-        """Corners (2, 3) [m] and relative stretch (E,) of the edges in one pose."""
+        self.forget()
         self.follow(pose)
         still = Strain(np.ones(len(self._chains)), 1.0)
-        deformed = self.skin.deform(self._anchors(still), REHEARSED_ITERATIONS)
+        deformed = self.skin.deform(self._anchors(still), FROM_REST)
         seen = self._with_body(deformed).vertices
         box = np.array([seen.min(axis=0), seen.max(axis=0)])
         return box, self.skin.stretch(deformed)
 
-    def _hold_back(self, stretch: Array, pulls: NDArray[np.bool_]) -> None:
-        """Make the turns smaller of each drive whose edges, of all E in T poses, are too tight."""
-        tight = np.zeros(len(self.gains))
-        for number, edges in enumerate(pulls.T):
-            own = stretch[:, edges]
-            tight[number] = np.percentile(own, 99.0) if own.size else 0.0
-        if tight.max(initial=0.0) <= MOST_STRETCH:  # the fault lies where no limb is: with all
-            tight[:] = MOST_STRETCH / LEAST_STEP
-        shares = np.clip(MOST_STRETCH / np.maximum(tight, MOST_STRETCH), 0.75, 1.0)
-        self.gains *= np.where(shares < 1.0, np.minimum(shares, LEAST_STEP), 1.0)
+    def forget(self) -> None:
+        """Go on as if no pose had been struck."""
+        self.skin.reset()
+        self._retargets.reset()
 
-    def _drives_of_edges(self) -> NDArray[np.bool_]:
-        """Which drives pull at each edge (E, D): they bend it, or move one of its ends only."""
+    def pulls(self) -> NDArray[np.bool_]:
+        """Which of D drives pull at each edge (E, D): they bend it, or move one end only."""
         bent = np.zeros((len(self.tree), len(self._chains)), dtype=bool)
         for number, chain in enumerate(self._chains):
             bent[list(chain[1:]), number] = True

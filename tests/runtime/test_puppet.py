@@ -24,7 +24,6 @@ from tests.runtime.figures import (
     HIPS,
     LEGS,
     T_POSE,
-    WEB,
     drive,
     frame,
     make_figure,
@@ -217,44 +216,6 @@ def test_chains_may_lead_away_from_where_the_first_begins(puppet: Puppet) -> Non
     away = np.linalg.norm(motion.vertices - FIGURE.vertices - lifted, axis=1)
     assert away[FIGURE.vertices[:, 1] > 1.3].min() > 0.2
     assert away[(FIGURE.vertices[:, 1] == 0.0) & (FIGURE.vertices[:, 0] > 0.0)].max() < 0.1
-
-
-def test_a_rehearsal_holds_back_only_the_limb_that_cannot_follow() -> None:
-    swings = [
-        seen(pose({"ShoulderLeft": (0, 0, angle), "ShoulderRight": (0, 0, -angle)}))
-        for angle in (0.0, 0.5, 0.9, 1.3)
-    ]
-    free = Puppet(FIGURE)
-    driven(free, ARMS)
-    box = free.rehearse(swings)
-    np.testing.assert_array_equal(free.gains, [1.0, 1.0])
-    webbed = Puppet(make_figure(WEB))
-    driven(webbed, ARMS)
-    webbed.rehearse(swings)
-    assert webbed.gains[0] < 0.95
-    assert webbed.gains[1] == 1.0
-
-    assert box.shape == (2, 3)
-    for moment in swings:
-        free.follow(moment)
-        for _ in range(4):
-            vertices = free.deform().vertices
-        assert (vertices >= box[0] - 0.05).all()
-        assert (vertices <= box[1] + 0.05).all()
-    assert box[0, 0] > -0.9, "an arm that is raised reaches less far to the side"
-    assert box[1, 1] > 1.7, "but higher"
-
-
-def test_a_rehearsal_leaves_no_trace_in_the_show() -> None:
-    swings = [seen(positions) for positions in waving(4)]
-    runs = []
-    for rehearsals in (0, 1):
-        puppet = Puppet(FIGURE)
-        driven(puppet, ARMS)
-        for _ in range(rehearsals):
-            puppet.rehearse(swings)
-        runs.append(perform(puppet, waving(4))[-1].vertices)
-    np.testing.assert_array_equal(*runs)
 
 
 def test_resting_again_brings_it_back(puppet: Puppet) -> None:
