@@ -197,7 +197,9 @@ def bind(
         if len(candidates) < RING:
             candidates = own
         ring = candidates[_ring(vertices[candidates] - anchor.point, anchor.tangent)]
-        beside[faces[np.isin(faces, ring).any(axis=1)]] = True
+        touched = np.zeros(len(vertices), dtype=np.bool_)
+        touched[ring] = True
+        beside[faces[touched[faces].any(axis=1)]] = True
         handles.extend(ring.tolist())
         groups.extend([index] * len(ring))
     _hold_loose_components(vertices, faces, owner, handles, groups)

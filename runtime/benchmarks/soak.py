@@ -49,12 +49,14 @@ class Soak:
         sent: frames that came.
         kept: frames that the recording gives back, in order.
         ticks: (T,) [s] how long each took.
+        work: (T,) [s] for how long of that the loop had a core: the rest, it waited for one.
         memory: (S,) resident memory [bytes], once a second of the show.
     """
 
     sent: int
     kept: int
     ticks: NDArray[np.float32]
+    work: NDArray[np.float32]
     memory: NDArray[np.float64]
 
     @property
@@ -81,6 +83,7 @@ def run(*, seconds: float = HOUR, real_time: bool = False) -> dict[str, object]:
         soak = soaked(Path(folder) / "soak.mcap", seconds, real_time=real_time)
     p50, p99, most = (1e3 * float(q) for q in np.percentile(soak.ticks, (50, 99, 100)))
     slow = int(np.count_nonzero(soak.ticks > LONGEST_TICK))
+    worked = 1e3 * float(soak.work.max())
     lost, resident = soak.sent - soak.kept, float(soak.memory[-1]) / 2**20
     print(f"  frames    {soak.sent} came, {lost} lost in the recording")
     print(
@@ -91,6 +94,7 @@ def run(*, seconds: float = HOUR, real_time: bool = False) -> dict[str, object]:
         f"  ticks     {len(soak.ticks)}: {p50:.2f} ms median, {p99:.2f} ms p99, {most:.2f} ms at "
         f"most, {slow} over {1e3 * LONGEST_TICK:.0f} ms"
     )
+    print(f"  work      {worked:.2f} ms of a core at most in a tick; beyond that it waited for one")
     return {
         "real_time": real_time,
         "seconds": seconds,
@@ -98,6 +102,7 @@ def run(*, seconds: float = HOUR, real_time: bool = False) -> dict[str, object]:
         "memory": {"mib": resident, "growth": soak.growth},
         "tick_ms": {"p50": p50, "p99": p99, "max": most},
         "ticks_over_50_ms": slow,
+        "work_ms_max": worked,
     }
 
 
@@ -109,7 +114,7 @@ def soaked(path: Path, seconds: float, *, real_time: bool) -> Soak:
         performance("show"), time.perf_counter if real_time else clock, performers=PERFORMERS
     )
     # Filled, not only claimed, so that their own memory does not grow.
-    spent = np.full(ticks, np.nan, np.float32)
+    spent, work = np.full((2, ticks), np.nan, np.float32)
     memory = np.full((ticks - 1) // TICKS_A_SAMPLE + 1, np.nan)
     waiting = WAITING if real_time else WAITING_ACCELERATED
     with Recorder(path, stream.skeleton, tell=warn, waiting=waiting) as recorder:
@@ -118,16 +123,17 @@ def soaked(path: Path, seconds: float, *, real_time: bool) -> Soak:
         ticker = Ticker(RATE)
         with long_lived():
             for tick in range(ticks):
-                began = time.perf_counter()
+                began, worked = time.perf_counter(), time.thread_time()
                 loop.tick()
                 loop.settle()
                 spent[tick] = time.perf_counter() - began
+                work[tick] = time.thread_time() - worked
                 if tick % TICKS_A_SAMPLE == 0:
                     memory[tick // TICKS_A_SAMPLE] = resident_memory()
                 clock.now = (tick + 1) / RATE
                 if real_time:
                     ticker.wait()
-    return Soak(log.count, log.found_in(path), spent, memory)
+    return Soak(log.count, log.found_in(path), spent, work, memory)
 
 
 def _loop(stream: RecordedStream) -> FrameLoop:
