@@ -28,7 +28,7 @@ from runtime.rehearsal import rehearse
 from runtime.render.camera import front_camera
 from solvers.arap import ArapSolver
 from solvers.decimation import decimate
-from solvers.edges import edge_lengths, unique_edges
+from solvers.edges import edge_lengths, stretch, unique_edges
 
 SIZES = (10_000, 20_000, 40_000, 100_000, 160_000, 300_000)
 FRAMES = 100
@@ -202,8 +202,7 @@ class Comparison:
         }
 
     def _stretch(self, vertices: Floats) -> float:
-        ratio = edge_lengths(vertices, self._edges) / self._lengths
-        return float(np.percentile(np.abs(ratio - 1.0), 99.0))
+        return float(np.percentile(stretch(vertices, self._edges, self._lengths), 99.0))
 
     def _normals(self, vertices: Floats) -> Floats:
         a, b, c = (vertices[self._faces[:, corner]] for corner in range(3))
