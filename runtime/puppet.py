@@ -188,7 +188,7 @@ class Puppet:
         deformed = self.skin.deform(self._anchors(still), FROM_REST)
         seen = self._with_body(deformed).vertices
         box = np.array([seen.min(axis=0), seen.max(axis=0)])
-        return box, self.skin.stretch(deformed)
+        return box, self.skin.edges.stretch(deformed)
 
     def forget(self) -> None:
         """Go on as if no pose had been struck."""
@@ -205,7 +205,7 @@ class Puppet:
             if self._parents[node] >= 0:
                 moved[node] |= moved[self._parents[node]]
         bone = np.where(self._bone >= 0, self._bone, self.binding.node)
-        near, far = bone[self.binding.owner][self.skin.edges].T
+        near, far = bone[self.binding.owner][self.skin.edges.ends].T
         pulls: NDArray[np.bool_] = bent[near] | bent[far] | (moved[near] != moved[far])
         return pulls
 

@@ -12,7 +12,7 @@ from runtime.characters.proxy import proxy_of
 from solvers.arap_cells import SPOKES
 from solvers.articulation import articulate
 from solvers.binding import bind
-from solvers.edges import edge_lengths, stretch, unique_edges
+from solvers.edges import Edges
 from solvers.handles import HARD, group_targets, stretched_turns
 from solvers.squash_stretch import SquashStretchSolver
 from solvers.tree import Tree
@@ -66,7 +66,7 @@ class Skin:
 
     Attributes:
         rest: (C, 3) [m] the surface that is deformed, at rest.
-        edges: (E, 2) its edges.
+        edges: its edges.
         binding: how it hangs on the nodes.
         notes: what the user should know about it, one short line each.
     """
@@ -74,9 +74,8 @@ class Skin:
     def __init__(self, character: Character, tree: Tree, *, energy: str = SPOKES) -> None:
         self._proxy = proxy = proxy_of(character)
         self.rest = proxy.vertices
-        self.edges = unique_edges(proxy.vertices, proxy.faces)
+        self.edges = Edges.of(proxy.vertices, proxy.faces)
         self.notes = proxy.notes
-        self._rest_lengths = edge_lengths(self.rest, self.edges)
         bone_of_vertex = _bones_of_weights(character, proxy.kept, tree.parents)
         self.binding = bind(
             proxy.vertices, proxy.faces, tree.parents, tree.positions, bone_of_vertex
@@ -163,10 +162,6 @@ class Skin:
         They are overwritten by the next call, or are the deformed surface itself.
         """
         return self._proxy.follow(deformed)
-
-    def stretch(self, deformed: Array) -> Array:
-        """Relative change of length (E,) of the edges of the deformed surface (C, 3) [m]."""
-        return stretch(deformed, self.edges, self._rest_lengths)
 
 
 def _bones_of_weights(character: Character, kept: Indices, parents: Indices) -> Indices | None:

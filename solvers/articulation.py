@@ -21,7 +21,7 @@ from scipy.sparse import coo_array, csr_array
 from scipy.sparse.csgraph import connected_components, dijkstra
 from scipy.spatial import KDTree
 
-from solvers.edges import edge_lengths, unique_edges
+from solvers.edges import Edges
 from solvers.limbs import closest_bones, limbs
 
 SEGMENT = 2.5  # the least length of a segment, in radii of its limb
@@ -177,11 +177,9 @@ def _turns(points: Array, along: Array, radius: float) -> Array:
 
 
 def _edge_graph(vertices: Array, faces: Indices) -> csr_array:
-    edges = unique_edges(vertices, faces)
-    lengths = edge_lengths(vertices, edges)
-    rows, columns = np.concatenate([edges, edges[:, ::-1]]).T
-    count = len(vertices)
-    return coo_array((np.tile(lengths, 2), (rows, columns)), shape=(count, count)).tocsr()
+    edges, count = Edges.of(vertices, faces), len(vertices)
+    rows, columns = np.concatenate([edges.ends, edges.ends[:, ::-1]]).T
+    return coo_array((np.tile(edges.lengths, 2), (rows, columns)), shape=(count, count)).tocsr()
 
 
 def _without_fragments(

@@ -28,7 +28,7 @@ from runtime.rehearsal import rehearse
 from runtime.render.camera import front_camera
 from solvers.arap import ArapSolver
 from solvers.decimation import decimate
-from solvers.edges import edge_lengths, stretch, unique_edges
+from solvers.edges import Edges
 
 SIZES = (10_000, 20_000, 40_000, 100_000, 160_000, 300_000)
 FRAMES = 100
@@ -177,8 +177,7 @@ class Comparison:
 
     def __init__(self, vertices: Floats, faces: Ints) -> None:
         self._rest, self._faces = vertices, faces
-        self._edges = unique_edges(vertices, faces)
-        self._lengths = edge_lengths(vertices, self._edges)
+        self._edges = Edges.of(vertices, faces)
         self._size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
 
     def figures(self, found: Floats, full: Floats) -> Figures:
@@ -202,7 +201,7 @@ class Comparison:
         }
 
     def _stretch(self, vertices: Floats) -> float:
-        return float(np.percentile(stretch(vertices, self._edges, self._lengths), 99.0))
+        return float(np.percentile(self._edges.stretch(vertices), 99.0))
 
     def _normals(self, vertices: Floats) -> Floats:
         a, b, c = (vertices[self._faces[:, corner]] for corner in range(3))

@@ -16,6 +16,7 @@ from runtime.output.stage_times import StageTimes
 from runtime.output.stretch import StretchStatistic
 from runtime.output.watchdog import Watchdog
 from runtime.output.whole_file import check_writable, whole_file
+from solvers.edges import Edges
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +46,8 @@ class Part:
     def __init__(self, character: Character) -> None:
         self.frames = 0
         self._character = character
-        self._stretch = StretchStatistic(character.vertices, character.faces)
+        self._edges = Edges.of(character.vertices, character.faces)
+        self._stretch = StretchStatistic()
         self._watchdog = Watchdog(character.vertices, character.faces)
         self._score: float | None = None
         self._pairs: tuple[MatchedPair, ...] = ()
@@ -60,8 +62,9 @@ class Part:
 
     def write(self, frame: PerformedFrame) -> None:
         """Count one performed frame."""
-        self._stretch.add(frame.vertices)
-        self._watchdog.add(frame.vertices)
+        stretch = self._edges.stretch(frame.vertices)
+        self._stretch.add(stretch)
+        self._watchdog.add(frame.vertices, stretch)
         self.frames += 1
 
     def close(self) -> None:

@@ -12,14 +12,14 @@ from runtime.output.energy_histogram import EnergyHistogram
 from solvers.arap_cells import SPOKES, build_cells
 from solvers.arap_kernels import fit_cells
 from solvers.compiled import kernel, most_threads, threads_for
-from solvers.edges import edge_lengths, unique_edges
+from solvers.histogram import count, percentile
 from solvers.laplacian import half_cotangents
 from solvers.rotation_fit import SCRATCH
 
 EACH_FRAME = 4_000  # vertices; a larger surface is looked at every so many frames
 SLIVER = 0.02  # height over longest side: the normal of a flatter triangle is noise
-_BINS = 2000  # of stretch, 0.005 wide each; more than ten counts as ten
-_BIN = 0.005
+_BIN = 0.005  # of stretch
+_BINS = 2001  # more than ten counts as ten
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -70,8 +70,6 @@ class Watchdog:
 
     def __init__(self, vertices: Array, faces: Indices) -> None:
         rest = np.ascontiguousarray(vertices, np.float64)
-        self._edges = unique_edges(rest, faces)
-        self._inverse_lengths = 1.0 / edge_lengths(rest, self._edges)
         self._faces, self._normals, self._areas = _sound(rest, faces)
         self._halves = half_cotangents(rest, self._faces)
         self._cells = build_cells(rest, np.asarray(faces, np.int64), SPOKES).cells
@@ -79,19 +77,24 @@ class Watchdog:
         self._unused = np.empty((len(rest), 3))
         self._room = np.empty((most_threads(), SCRATCH))
         self._runs = np.zeros(len(self._faces), np.int64)
-        self._histogram = np.zeros(_BINS + 1, np.int64)
+        self._counts = np.zeros(_BINS, np.int64)
         self._stride = max(1, -(-len(rest) // EACH_FRAME))
         self._frames = self._looks = self._bad_looks = 0
         self._energies = EnergyHistogram()
         self._worst = Finding(0.0, 0.0, 0.0, 0, 0)
         self.last: Finding | None = None
-        self._look(rest)  # compiles now, or loads what an earlier run compiled
+        self._look(rest, np.zeros(0))  # compiles now, or loads what an earlier run compiled
         self._runs[:] = 0
 
-    def add(self, vertices: Array) -> None:
-        """Look at one deformed surface (N, 3) [m], if it is its turn."""
+    def add(self, vertices: Array, stretch: Array) -> None:
+        """Look at one deformed surface, if it is its turn.
+
+        Args:
+            vertices: (N, 3) [m].
+            stretch: (E,) relative change of the length of its edges.
+        """
         if self._frames % self._stride == 0:
-            self.last = found = self._look(np.ascontiguousarray(vertices, np.float64))
+            self.last = found = self._look(np.ascontiguousarray(vertices, np.float64), stretch)
             self._looks += 1
             self._bad_looks += found.inverted > 0
             self._energies.add(found.energy)
@@ -105,7 +108,7 @@ class Watchdog:
             )
         self._frames += 1
 
-    def _look(self, x: Array) -> Finding:
+    def _look(self, x: Array, stretch: Array) -> Finding:
         with threads_for(len(x)):
             fit_cells(x, self._cells, self._R, self._unused, self._room)
         energy, inverted, longest = _judge_faces(
@@ -115,14 +118,14 @@ class Watchdog:
             self._stride,
             self._runs,
         )
-        self._histogram[:] = 0
-        most = _judge_edges(x, self._edges, self._inverse_lengths, self._histogram)
-        share = np.searchsorted(np.cumsum(self._histogram), 0.99 * self._histogram.sum())
+        self._counts[:] = 0
+        count(stretch, _BIN, self._counts)
+        most = float(stretch.max(initial=0.0))
         area = float(self._areas.sum())
         return Finding(
             energy=energy / area if area > 0.0 else 0.0,
-            stretch_p99=_BIN * float(share),
-            stretch_max=most,
+            stretch_p99=float(percentile(self._counts, _BIN, 99.0)),
+            stretch_max=most if most < np.inf else np.inf,  # also when it is not a number
             inverted=inverted,
             longest=longest,
         )
@@ -158,22 +161,6 @@ def _sound(rest: Array, faces: Indices) -> tuple[Indices, Array, Array]:
     normals, doubled = normals[is_sound], doubled[is_sound]
     kept = np.ascontiguousarray(faces[is_sound], np.int64)
     return kept, normals / doubled[:, None], 0.5 * doubled
-
-
-@kernel
-def _judge_edges(x: Array, edges: Indices, inverse_lengths: Array, histogram: Indices) -> float:
-    """Put every edge's stretch into `histogram`, whose last bin is all above; give the largest."""
-    last = len(histogram) - 1
-    most = 0.0
-    for edge in range(len(edges)):
-        a, b = edges[edge, 0], edges[edge, 1]
-        d0, d1, d2 = x[a, 0] - x[b, 0], x[a, 1] - x[b, 1], x[a, 2] - x[b, 2]
-        stretch = abs(np.sqrt(d0 * d0 + d1 * d1 + d2 * d2) * inverse_lengths[edge] - 1.0)
-        if not stretch < np.inf:  # also when it is not a number
-            stretch = np.inf
-        most = max(most, stretch)
-        histogram[last if stretch >= last * _BIN else int(stretch / _BIN)] += 1
-    return float(most)
 
 
 @kernel

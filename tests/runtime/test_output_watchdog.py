@@ -10,6 +10,7 @@ from runtime.output import watchdog
 from runtime.output.energy_histogram import EnergyHistogram
 from runtime.output.report import Report
 from runtime.output.watchdog import Finding, Watchdog
+from solvers.edges import Edges
 from tests.runtime.tentacle import make_show, make_tentacle
 
 
@@ -24,11 +25,21 @@ def sheet(side: int = 12) -> tuple[np.ndarray, np.ndarray]:
     return vertices, faces
 
 
+class Watched:
+    """A surface with a watchdog, who is told how its edges stretch."""
+
+    def __init__(self, vertices: np.ndarray, faces: np.ndarray) -> None:
+        self.dog = Watchdog(vertices, faces)
+        self._edges = Edges.of(vertices, faces)
+
+    def add(self, deformed: np.ndarray) -> Finding:
+        self.dog.add(deformed, self._edges.stretch(deformed))
+        assert self.dog.last is not None
+        return self.dog.last
+
+
 def look(vertices: np.ndarray, faces: np.ndarray, deformed: np.ndarray) -> Finding:
-    dog = Watchdog(vertices, faces)
-    dog.add(deformed)
-    assert dog.last is not None
-    return dog.last
+    return Watched(vertices, faces).add(deformed)
 
 
 @settings(deadline=None)
@@ -97,7 +108,7 @@ def test_slivers_are_never_inverted() -> None:
 
 def test_runs_are_those_of_one_triangle() -> None:
     vertices, faces = sheet()
-    dog = Watchdog(vertices, faces)
+    watched = Watched(vertices, faces)
 
     def folded(*corners: int) -> np.ndarray:
         moved = vertices.copy()
@@ -105,8 +116,8 @@ def test_runs_are_those_of_one_triangle() -> None:
         return moved
 
     for corners in ((39,), (39,), (), (39,), (39, 90), (90,), (90,), ()):
-        dog.add(folded(*corners))
-    inverted = dog.summary()["inverted"]
+        watched.add(folded(*corners))
+    inverted = watched.dog.summary()["inverted"]
     assert inverted["longest"] == 3
     assert inverted["frames"] == 6
     assert inverted["last"] == 0
@@ -116,26 +127,25 @@ def test_runs_are_those_of_one_triangle() -> None:
 def test_a_large_surface_is_looked_at_now_and_then(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(watchdog, "EACH_FRAME", 60)  # of 144 vertices: every third frame
     vertices, faces = sheet()
-    dog = Watchdog(vertices, faces)
+    watched = Watched(vertices, faces)
     folded = vertices.copy()
     folded[39] += [1.4, 1.4, 0.0]
     for frame in range(12):
-        dog.add(folded if frame >= 6 else vertices)
-    assert dog.summary()["inverted"]["longest"] == 6
-    assert dog.summary()["inverted"]["frames"] == 6
+        watched.add(folded if frame >= 6 else vertices)
+    inverted = watched.dog.summary()["inverted"]
+    assert inverted["longest"] == 6
+    assert inverted["frames"] == 6
 
 
 def test_the_report_holds_the_worst_of_the_show() -> None:
     character = make_tentacle()
     report = Report(None)
     part = report.cast(character)
-    dog = Watchdog(character.vertices, character.faces)
+    watched = Watched(character.vertices, character.faces)
     found = []
     for frame in make_show(character, frames=10):
         part.write(frame)
-        dog.add(frame.vertices)
-        assert dog.last is not None
-        found.append(dog.last)
+        found.append(watched.add(frame.vertices))
     said = report.summary()["watchdog"]
     assert said["energy"]["max"] == max(one.energy for one in found)
     assert said["energy"]["p50"] == pytest.approx(np.median([one.energy for one in found]), rel=0.1)
@@ -146,10 +156,9 @@ def test_the_report_holds_the_worst_of_the_show() -> None:
 
 def test_no_faces_and_no_frames_are_in_order() -> None:
     nothing = np.zeros((0, 3), np.int64)
-    dog = Watchdog(np.eye(3), nothing)
-    assert dog.summary()["energy"] == {"p50": 0.0, "max": 0.0}
-    dog.add(np.eye(3))
-    assert dog.last == Finding(0.0, 0.0, 0.0, 0, 0)
+    watched = Watched(np.eye(3), nothing)
+    assert watched.dog.summary()["energy"] == {"p50": 0.0, "max": 0.0}
+    assert watched.add(np.eye(3)) == Finding(0.0, 0.0, 0.0, 0, 0)
 
 
 def test_what_tears_is_infinite() -> None:

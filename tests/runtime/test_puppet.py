@@ -15,7 +15,6 @@ from runtime.mapping import Drive, Mapping
 from runtime.performer import Performer, Pose, rest_state
 from runtime.puppet import Body, Motion, Puppet, body_of
 from runtime.skin import Elasticity
-from solvers.edges import unique_edges
 from solvers.heading import turned
 from tests.runtime.figures import (
     ARMS,
@@ -276,13 +275,6 @@ def test_the_body_goes_along_when_every_leg_drives() -> None:
     assert body((drive("ArmLeft", ("hip.L", "knee.L")), LEGS[1])) == Body()
     assert body((*ARMS, *LEGS), []) == Body(), "a hand has no legs"
     assert body(LEGS, legs[:1]) == Body()
-
-
-def test_every_edge_counts_once_and_edges_without_length_never() -> None:
-    vertices = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 1, 0]], dtype=float)
-    faces = np.array([[0, 1, 2], [0, 2, 3], [3, 4, 0]])
-    edges = {tuple(edge) for edge in unique_edges(vertices, faces).tolist()}
-    assert edges == {(0, 1), (1, 2), (0, 2), (2, 3), (0, 3), (0, 4)}
 
 
 def test_a_cartoon_stretches_the_limbs_that_swing_and_rigid_ones_keep_their_length(
