@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from runtime.performer import Pose
 from runtime.puppet import Puppet
+from solvers.histogram import Counts, count, percentile
 
 Array = NDArray[np.float64]
-Bools = NDArray[np.bool_]
 
 MOST_STRETCH = 0.4  # of an edge
 OF_ALL = 99.0  # percentile of all edges in all poses that may stretch no more
@@ -26,6 +26,9 @@ ROUNDS = 16  # at most
 STEPS = (0.75, 0.9)  # least and greatest share by which a limb is held back in a round
 HELPED = 0.98  # of the stretch that was: with more left, it is not this limb's doing
 
+_BIN = 0.002  # of stretch: what a percentile is exact to
+_BINS = 2001  # so stretches up to 4 are told apart; all above count as 4
+
 
 def restrain(puppet: Puppet, poses: Sequence[Pose]) -> Array:
     """Go through poses and set the puppet's gains so that its surface can follow them all.
@@ -34,63 +37,78 @@ def restrain(puppet: Puppet, poses: Sequence[Pose]) -> Array:
         (2, 3) [m] least and greatest corner of all that it fills meanwhile, on the stage.
     """
     trial = _Trial(puppet, poses)
-    pulls = puppet.pulls()
     for _ in range(ROUNDS):
-        if np.percentile(trial.stretch, OF_ALL) <= MOST_STRETCH:
+        if _tight(trial.all_edges.sum(axis=0), OF_ALL) <= MOST_STRETCH:
             break
-        puppet.gains *= _steps(_tightness(trial.stretch, pulls))
-        trial.repeat(np.percentile(trial.stretch, OF_ALL, axis=1))
-    for limb, edges in enumerate(pulls.T):
-        if edges.any():
-            _spare(puppet, trial, limb, edges)
+        puppet.gains *= _steps(_tightness(trial))
+        trial.repeat(_tight(trial.all_edges, OF_ALL))
+    for limb in range(len(puppet.gains)):
+        _spare(puppet, trial, limb)
     puppet.forget()
     return np.array([trial.boxes[:, 0].min(axis=0), trial.boxes[:, 1].max(axis=0)])
 
 
 class _Trial:
-    """Poses that a puppet goes through.
+    """T poses that a puppet of D limbs goes through.
 
     Attributes:
         boxes: (T, 2, 3) [m] corners of what it fills in each.
-        stretch: (T, E) relative change of the length of its edges.
+        limb_edges: (T, D, B) how many of the edges that each limb pulls at stretch how much.
+        all_edges: (T, B) how many of all edges do.
     """
 
     def __init__(self, puppet: Puppet, poses: Sequence[Pose]) -> None:
         self._puppet = puppet
         self._poses = poses
-        boxes, stretches = zip(*map(puppet.attempt, poses), strict=True)
-        self.boxes, self.stretch = np.array(boxes), np.array(stretches)
+        self._pulled = [np.flatnonzero(edges) for edges in puppet.pulls().T]
+        self.boxes = np.empty((len(poses), 2, 3))
+        self.limb_edges = np.empty((len(poses), len(self._pulled), _BINS), dtype=np.int64)
+        self.all_edges = np.empty((len(poses), _BINS), dtype=np.int64)
+        for number in range(len(poses)):
+            self._try(number)
 
     def repeat(self, tightness: Array) -> None:
         """Try again those that were not easy, (T,): smaller turns stretch no pose more."""
         for number in np.flatnonzero(tightness > EASY * MOST_STRETCH).tolist():
-            self.boxes[number], self.stretch[number] = self._puppet.attempt(self._poses[number])
+            self._try(number)
+
+    def _try(self, number: int) -> None:
+        self.boxes[number], stretch = self._puppet.attempt(self._poses[number])
+        self.all_edges[number] = self.limb_edges[number] = 0
+        count(stretch, _BIN, self.all_edges[number])
+        for limb, edges in enumerate(self._pulled):
+            count(stretch[edges], _BIN, self.limb_edges[number, limb])
 
 
-def _tightness(stretch: Array, pulls: Bools) -> Array:
-    """How tight (D,) what each drive pulls at is, of all E edges in T poses."""
-    tight = [np.percentile(stretch[:, edges], OF_ALL) if edges.any() else 0.0 for edges in pulls.T]
-    if max(tight, default=0.0) <= MOST_STRETCH:  # the fault lies where no limb is: with all
+def _tight(counts: Counts, percent: float) -> Array:
+    """The stretch (...) that so many percent of the edges counted (..., B) do not pass."""
+    return percentile(counts, _BIN, percent)
+
+
+def _tightness(trial: _Trial) -> Array:
+    """How tight (D,) what each limb pulls at is, over all poses."""
+    tight = _tight(trial.limb_edges.sum(axis=0), OF_ALL)
+    if tight.max(initial=0.0) <= MOST_STRETCH:  # the fault lies where no limb is: with all
         return np.full(len(tight), MOST_STRETCH / STEPS[1])
-    return np.array(tight)
+    return tight
 
 
 def _steps(tight: Array) -> Array:
-    """By what share drives as tight as this are held back in a round; 1 for those that are not."""
+    """By what share limbs as tight as this are held back in a round; 1 for those that are not."""
     shares = np.clip(MOST_STRETCH / np.maximum(tight, MOST_STRETCH), STEPS[0], 1.0)
     return np.where(shares < 1.0, np.minimum(shares, STEPS[1]), 1.0)
 
 
-def _spare(puppet: Puppet, trial: _Trial, limb: int, edges: Bools) -> None:
-    """Hold one limb back until its edges (E,) are crushed in no pose, or that helps no more."""
-    tight = np.percentile(trial.stretch[:, edges], OF_LIMB, axis=1)
+def _spare(puppet: Puppet, trial: _Trial, limb: int) -> None:
+    """Hold one limb back until its edges are crushed in no pose, or that helps no more."""
+    tight = _tight(trial.limb_edges[:, limb], OF_LIMB)
     for _ in range(ROUNDS):
         worst, gain = tight.max(), puppet.gains[limb]
         if worst <= MOST_STRETCH:
             return
         puppet.gains[limb] *= _steps(worst)
         trial.repeat(tight)
-        tight, before = np.percentile(trial.stretch[:, edges], OF_LIMB, axis=1), tight
+        tight, before = _tight(trial.limb_edges[:, limb], OF_LIMB), tight
         if tight.max() > HELPED * worst:
             puppet.gains[limb] = gain
             trial.repeat(before)
