@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import json
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -116,11 +117,11 @@ def _node(node: object, target: Skeleton) -> int:
 def mapping_as_json(mapping: Mapping, source: Skeleton) -> dict[str, Any]:
     """Give a mapping as `read_mapping` reads it, with node numbers for the target."""
     return {
-        "score": mapping.score if mapping.score == mapping.score else None,
+        "score": float(mapping.score) if math.isfinite(mapping.score) else None,
         "pairs": [
             {
                 "source": [source.names[joint] for joint in drive.source],
-                "target": list(drive.target),
+                "target": [int(node) for node in drive.target],
                 "flip": drive.flip,
             }
             for drive in mapping.drives

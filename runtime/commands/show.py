@@ -35,7 +35,7 @@ from runtime.ensemble import Act, Ensemble
 from runtime.interrupt import held
 from runtime.loop import FrameLoop
 from runtime.mapping import Mapping, read_mapping
-from runtime.output.report import MatchedPair, Report
+from runtime.output.report import Report
 from runtime.pacing import TICKS, pace_of
 from runtime.pauses import long_lived
 from runtime.performer import Performer
@@ -337,19 +337,14 @@ class _Show:
 
     def _tell(self, loop: FrameLoop) -> None:
         """Put what is only known at the end into the report."""
-        names = self._performer.skeleton.names
-        recording = self._source.recording
+        skeleton, recording = self._performer.skeleton, self._source.recording
         if recording is None:
             frames, seconds = loop.received, loop.seconds
         else:
             frames, seconds = len(recording), recording.seconds
-        self._report.recorded(frames=frames, joints=len(names), seconds=seconds)
+        self._report.recorded(frames=frames, joints=len(skeleton.names), seconds=seconds)
         for part, puppet in zip(self._parts, self._puppets, strict=True):
-            pairs = [
-                MatchedPair(tuple(names[joint] for joint in drive.source), drive.target)
-                for drive in puppet.mapping.drives
-            ]
-            part.matched(puppet.mapping.score, pairs)
+            part.matched(puppet.mapping, skeleton)
 
 
 def _milliseconds(seconds: float) -> str:

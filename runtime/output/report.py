@@ -4,32 +4,19 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Self
 
+from devices.skeleton import Skeleton
 from replay.recorder import Recorder
 from runtime.character import Character
+from runtime.mapping import Mapping, mapping_as_json
 from runtime.output.output import PerformedFrame
 from runtime.output.stage_times import StageTimes
 from runtime.output.stretch import StretchStatistic
 from runtime.output.watchdog import Watchdog
 from runtime.output.whole_file import check_writable, whole_file
 from solvers.edges import Edges
-
-
-@dataclass(frozen=True, slots=True)
-class MatchedPair:
-    """One chain of the performer and the chain of the character that it drives.
-
-    Attributes:
-        source: names of the performer's joints, root end first.
-        target: nodes of the character's skeleton, root end first.
-    """
-
-    source: tuple[str, ...]
-    target: tuple[int, ...]
 
 
 class Part:
@@ -49,16 +36,11 @@ class Part:
         self._edges = Edges.of(character.vertices, character.faces)
         self._stretch = StretchStatistic()
         self._watchdog = Watchdog(character.vertices, character.faces)
-        self._score: float | None = None
-        self._pairs: tuple[MatchedPair, ...] = ()
+        self._match: dict[str, Any] = {"score": None, "pairs": []}
 
-    def matched(self, score: float | None, pairs: Sequence[MatchedPair]) -> None:
-        """Set the match that the character performs with; the last one stands.
-
-        `score` is None for a mapping given by hand.
-        """
-        self._score = None if score is None else float(score)
-        self._pairs = tuple(pairs)
+    def matched(self, mapping: Mapping, performer: Skeleton) -> None:
+        """Set the match that the character performs with; the last one stands."""
+        self._match = mapping_as_json(mapping, performer)
 
     def write(self, frame: PerformedFrame) -> None:
         """Count one performed frame."""
@@ -85,13 +67,7 @@ class Part:
                 "faces": len(body.faces),
                 "nodes": len(body.skeleton.names),
             },
-            "match": {
-                "score": self._score,
-                "pairs": [
-                    {"source": list(pair.source), "target": [int(node) for node in pair.target]}
-                    for pair in self._pairs
-                ],
-            },
+            "match": self._match,
             "stretch": {"mean": self._stretch.mean, "p99": self._stretch.p99},
             "watchdog": self._watchdog.summary(),
         }
@@ -101,13 +77,12 @@ class Report:
     """Collects the figures of a show and writes them as JSON at the end.
 
     The keys: ``frames``, ``dropped``, ``recording`` {frames, joints, seconds}, ``record`` {frames,
-    lost, fault} of the recording that was made, or null, ``character``
-    {vertices, faces, nodes}, ``match`` {score, pairs: [{source: [joint names], target: [node
-    ids]}]}, ``stages_ms`` {poll, match, retarget, deform, render, publish, frame, settle, latency:
-    {p50, p99, max}}, ``stretch`` {mean, p99}, ``watchdog`` {energy {p50, max}, stretch {p99, max},
-    inverted {max, last, longest, frames}}. With several characters ``character``, ``match``,
-    ``stretch`` and ``watchdog`` are those of the first, and ``characters`` lists them for each,
-    with its ``name``.
+    lost, fault} of the recording that was made, or null, ``character`` {vertices, faces, nodes},
+    ``match`` {score, pairs: [{source: [joint names], target: [node ids], flip}]}, ``stages_ms``
+    {poll, match, retarget, deform, render, publish, frame, settle, latency: {p50, p99, max}},
+    ``stretch`` {mean, p99}, ``watchdog`` {energy {p50, max}, stretch {p99, max}, inverted {max,
+    last, longest, frames}}. With several characters ``character``, ``match``, ``stretch`` and
+    ``watchdog`` are those of the first, and ``characters`` lists them for each, with its ``name``.
     A value that is not a finite number is written as null: the file is JSON by the letter of
     RFC 8259.
 

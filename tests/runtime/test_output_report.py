@@ -9,8 +9,12 @@ import numpy as np
 import pytest
 
 from devices.errors import InputError
-from runtime.output.report import MatchedPair, Report
+from devices.skeleton import Skeleton
+from runtime.mapping import Drive, Mapping
+from runtime.output.report import Report
 from tests.runtime.tentacle import NODES, make_show, make_tentacle
+
+LEG = Skeleton(("Hip", "Knee"), np.array([-1, 0]), np.array([[0.0, 1, 0], [0, 0, 0]]))
 
 
 def refuse(constant: str) -> NoReturn:
@@ -22,7 +26,8 @@ def test_the_report_has_the_keys_that_others_read(tmp_path: Path) -> None:
     with Report(tmp_path / "r.json") as report:
         report.recorded(frames=np.int64(9), joints=25, seconds=np.float32(0.5))
         part = report.cast(character)
-        part.matched(np.float32(0.75), [MatchedPair(("Hip", "Knee"), tuple(np.arange(3)))])
+        drive = Drive((0, 1), tuple(np.arange(3)), flip=True)
+        part.matched(Mapping((drive,), score=np.float32(0.75)), LEG)
         for frame in make_show(character, frames=7):
             part.write(frame)
             report.times.add("deform", 0.002)
@@ -50,7 +55,10 @@ def test_the_report_has_the_keys_that_others_read(tmp_path: Path) -> None:
             "faces": len(character.faces),
             "nodes": NODES,
         },
-        "match": {"score": 0.75, "pairs": [{"source": ["Hip", "Knee"], "target": [0, 1, 2]}]},
+        "match": {
+            "score": 0.75,
+            "pairs": [{"source": ["Hip", "Knee"], "target": [0, 1, 2], "flip": True}],
+        },
     }
 
 
@@ -59,7 +67,7 @@ def test_several_characters_are_listed_beside_the_first(tmp_path: Path) -> None:
     with Report(tmp_path / "r.json") as report:
         first = report.cast(character)
         second = report.cast(replace(character, name="other"))
-        second.matched(None, [])
+        second.matched(Mapping(()), LEG)
         for frame in make_show(character, frames=3):
             first.write(frame)
             second.write(replace(frame, vertices=character.vertices))
@@ -75,7 +83,7 @@ def test_several_characters_are_listed_beside_the_first(tmp_path: Path) -> None:
 def test_numbers_that_json_cannot_hold_become_null(tmp_path: Path) -> None:
     with Report(tmp_path / "r.json") as report:
         report.recorded(frames=1, joints=2, seconds=float("nan"))
-        report.cast(make_tentacle()).matched(float("-inf"), [])
+        report.cast(make_tentacle()).matched(Mapping((), score=float("-inf")), LEG)
     written = json.loads((tmp_path / "r.json").read_text(), parse_constant=refuse)
     assert written["recording"]["seconds"] is None
     assert written["match"]["score"] is None
@@ -84,7 +92,8 @@ def test_numbers_that_json_cannot_hold_become_null(tmp_path: Path) -> None:
 def test_names_of_any_kind_can_be_written(tmp_path: Path) -> None:
     with Report(tmp_path / "r.json") as report:
         part = report.cast(make_tentacle())
-        part.matched(1.0, [MatchedPair(('"é\n', "\udc80"), (1,))])
+        names = ('"é\n', "\udc80")
+        part.matched(Mapping((Drive((0, 1), (0, 1)),)), replace(LEG, names=names))
     pairs = json.loads((tmp_path / "r.json").read_bytes())["match"]["pairs"]
     assert pairs[0]["source"] == ['"é\n', "\udc80"]
 
