@@ -32,7 +32,8 @@ class _Chains(NamedTuple):
 class ChainRetargets:
     """Carries D motions of one body over to as many target polylines, frame by frame.
 
-    Each is what `ChainRetarget` says.
+    Rotations are measured in the body's world, and given in the targets': a limb on a spine that
+    bends already holds the spine's turn.
 
     Args:
         maps: how each chain's motion is carried over.

@@ -171,77 +171,6 @@ def map_chain(
     return ChainMap(_directions(source), views[0][2].copy(), bones, shares, change)
 
 
-class ChainRetarget:
-    """Carries the motion of a source polyline over to a target polyline, frame by frame.
-
-    Args:
-        source_rest, target_rest, source_view, target_view, flip: as of `map_chain`.
-
-    Rotations are measured in the source's world, and given in the target's: a limb on a spine that
-    bends already holds the spine's turn.
-
-    Raises:
-        ValueError: a wrong shape.
-    """
-
-    def __init__(
-        self,
-        source_rest: ArrayLike,
-        target_rest: ArrayLike,
-        source_view: ArrayLike,
-        target_view: ArrayLike,
-        flip: bool = False,
-    ) -> None:
-        self._map = map_chain(source_rest, target_rest, source_view, target_view, flip)
-        self._turns = np.zeros((len(self._map.rest), 4))  # all zero: no frame has been seen
-        self._last = np.zeros((len(self._map.rest), 3))
-
-    def reset(self) -> None:
-        """Forget the last frame, as after a cut."""
-        self._turns[:] = 0.0
-
-    def rotations(self, source_pose: ArrayLike) -> Array:
-        """World rotations (Q - 1, 4) of the target's bones from rest, for a pose (P, 3).
-
-        The pose must be finite.
-        """
-        pose = np.ascontiguousarray(source_pose, dtype=np.float64)
-        nodes = len(self._turns) + 1
-        if pose.shape != (nodes, 3):
-            raise ValueError(f"Expected `source_pose` to have shape ({nodes}, 3), got {pose.shape}")
-        follow_bones(self._map.rest, pose, self._map.axis, self._turns, self._last)
-        return self._sampled()
-
-    def rotations_of_bones(self, bone_rotations: ArrayLike) -> Array:
-        """As `rotations`, from the source bones' own world rotations (P - 1, 4) from rest.
-
-        For devices that measure twist as well.
-        """
-        given = np.ascontiguousarray(bone_rotations, dtype=np.float64)
-        if given.shape != self._turns.shape:
-            raise ValueError(
-                f"Expected `bone_rotations` to have shape {self._turns.shape}, got {given.shape}"
-            )
-        _follow_rotations(given, self._turns)
-        return self._sampled()
-
-    def _sampled(self) -> Array:
-        sampled = np.empty((len(self._map.bones), 4))
-        sample_bones(self._turns, self._map.bones, self._map.shares, self._map.change, sampled)
-        return sampled
-
-
-def cumulative_rotations(source_rest: ArrayLike, source_pose: ArrayLike) -> Array:
-    """World rotations p (P - 1, 4) of a polyline's bones from rest, without any history.
-
-    Source: AniMesh, section 5.1.
-    """
-    rest = _polyline(source_rest, "source_rest")
-    view = np.eye(3)
-    retarget = ChainRetarget(rest, rest, view, view)
-    return retarget.rotations(source_pose)
-
-
 def _polyline(points: ArrayLike, name: str) -> Array:
     array = np.array(points, dtype=np.float64)
     if array.ndim != 2 or array.shape[1] != 3 or len(array) < 2:
@@ -339,20 +268,6 @@ def _same_side(
     if sign * turn[3] < _LONGEST_TURN:
         sign = -sign
     return (sign * turn[0], sign * turn[1], sign * turn[2], sign * turn[3])
-
-
-@kernel
-def _follow_rotations(given: Array, turns: Array) -> None:
-    """Update each bone's turn against its predecessor from the bones' own rotations."""
-    carried = (0.0, 0.0, 0.0, 1.0)
-    for i in range(len(given)):
-        here = normalized((given[i, 0], given[i, 1], given[i, 2], given[i, 3]))
-        turn = multiply(conjugate(carried), here)
-        before = (turns[i, 0], turns[i, 1], turns[i, 2], turns[i, 3])
-        if before[0] ** 2 + before[1] ** 2 + before[2] ** 2 + before[3] ** 2 < 0.5:
-            before = (0.0, 0.0, 0.0, 1.0)
-        turns[i, 0], turns[i, 1], turns[i, 2], turns[i, 3] = _same_side(turn, before)
-        carried = here
 
 
 @kernel

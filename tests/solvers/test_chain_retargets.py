@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from solvers.chain_retargets import ChainRetargets
-from solvers.polyline_motion import ChainMap, ChainRetarget, map_chain
+from solvers.polyline_motion import ChainMap, map_chain
 
 FRONT = np.eye(3)
 SOURCES = [(0, 1, 2, 3), (5, 4), (1, 6, 5)]  # joints may serve more than one chain
@@ -36,16 +36,10 @@ def poses(count: int) -> np.ndarray:
 def alone(positions: np.ndarray) -> np.ndarray:
     """(T, 9, 4) what each chain does that knows of no other."""
     retargets = [
-        ChainRetarget(REST[list(source)], target, FRONT, FRONT)
-        for source, target in zip(SOURCES, TARGETS, strict=True)
+        ChainRetargets([chain], [source]) for chain, source in zip(maps(), SOURCES, strict=True)
     ]
     return np.array(
-        [
-            np.concatenate(
-                [r.rotations(pose[list(s)]) for r, s in zip(retargets, SOURCES, strict=True)]
-            )
-            for pose in positions
-        ]
+        [np.concatenate([one.rotations(pose, FULL[:1]) for one in retargets]) for pose in positions]
     )
 
 
