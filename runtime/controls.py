@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 from runtime.actions import ACTIONS, Desk
 from runtime.theatre import Theatre
 from runtime.window import Event, KeyPressed, Resized, Window
@@ -81,8 +79,3 @@ class Controls:
             is_switch = action.write is not None  # not turned over and over by a key held down
             if action.press is not None and not (event.again and is_switch):
                 action.press(self._desk)
-
-
-def key_help() -> Sequence[str]:
-    """A line for each key."""
-    return [f"{key:<10}{ACTIONS[name].text}" for key, name in KEYS.items()]
