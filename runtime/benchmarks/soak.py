@@ -18,6 +18,7 @@ from replay.mcap_file import McapReader
 from replay.recorded_stream import Keep, RecordedStream
 from replay.recorder import WAITING, Recorder
 from runtime.benchmarks.memory import resident_memory
+from runtime.benchmarks.stolen_time import JIFFY, stolen_time
 from runtime.characters.builtin import builtin_character
 from runtime.clock import Ticker
 from runtime.conditioning.switches import for_live
@@ -50,6 +51,8 @@ class Soak:
         kept: frames that the recording gives back, in order.
         ticks: (T,) [s] how long each took.
         work: (T,) [s] for how long of that the loop had a core: the rest, it waited for one.
+        stolen: (T,) [s] for how long the machine's host kept its cores to itself since the tick
+            before, of all cores together.
         memory: (S,) resident memory [bytes], once a second of the show.
     """
 
@@ -57,12 +60,26 @@ class Soak:
     kept: int
     ticks: NDArray[np.float32]
     work: NDArray[np.float32]
+    stolen: NDArray[np.float32]
     memory: NDArray[np.float64]
 
     @property
     def warm(self) -> int:
         """Seconds of the show after which memory counts."""
         return int(min(WARM_UP * len(self.memory), MOST_WARM_UP))
+
+    @property
+    def slow(self) -> NDArray[np.bool_]:
+        """Which ticks (T,) took too long."""
+        slow: NDArray[np.bool_] = self.ticks > LONGEST_TICK
+        return slow
+
+    @property
+    def stalled(self) -> NDArray[np.bool_]:
+        """Which of those (T,) the host took cores in; it is counted once it gives them back."""
+        counted_later = np.append(self.stolen[1:], 0.0)
+        stalled: NDArray[np.bool_] = self.slow & (self.stolen + counted_later >= 0.99 * JIFFY)
+        return stalled
 
     @property
     def growth(self) -> float:
@@ -82,7 +99,7 @@ def run(*, seconds: float = HOUR, real_time: bool = False) -> dict[str, object]:
     with tempfile.TemporaryDirectory() as folder:
         soak = soaked(Path(folder) / "soak.mcap", seconds, real_time=real_time)
     p50, p99, most = (1e3 * float(q) for q in np.percentile(soak.ticks, (50, 99, 100)))
-    slow = int(np.count_nonzero(soak.ticks > LONGEST_TICK))
+    slow, stalled = int(soak.slow.sum()), int(soak.stalled.sum())
     worked = 1e3 * float(soak.work.max())
     lost, resident = soak.sent - soak.kept, float(soak.memory[-1]) / 2**20
     print(f"  frames    {soak.sent} came, {lost} lost in the recording")
@@ -92,7 +109,8 @@ def run(*, seconds: float = HOUR, real_time: bool = False) -> dict[str, object]:
     )
     print(
         f"  ticks     {len(soak.ticks)}: {p50:.2f} ms median, {p99:.2f} ms p99, {most:.2f} ms at "
-        f"most, {slow} over {1e3 * LONGEST_TICK:.0f} ms"
+        f"most, {slow} over {1e3 * LONGEST_TICK:.0f} ms, {stalled} of them where this machine's "
+        "host took its cores"
     )
     print(f"  work      {worked:.2f} ms of a core at most in a tick; beyond that it waited for one")
     return {
@@ -102,6 +120,7 @@ def run(*, seconds: float = HOUR, real_time: bool = False) -> dict[str, object]:
         "memory": {"mib": resident, "growth": soak.growth},
         "tick_ms": {"p50": p50, "p99": p99, "max": most},
         "ticks_over_50_ms": slow,
+        "of_them_stolen": stalled,
         "work_ms_max": worked,
     }
 
@@ -114,7 +133,7 @@ def soaked(path: Path, seconds: float, *, real_time: bool) -> Soak:
         performance("show"), time.perf_counter if real_time else clock, performers=PERFORMERS
     )
     # Filled, not only claimed, so that their own memory does not grow.
-    spent, work = np.full((2, ticks), np.nan, np.float32)
+    spent, work, stolen = np.full((3, ticks), np.nan, np.float32)
     memory = np.full((ticks - 1) // TICKS_A_SAMPLE + 1, np.nan)
     waiting = WAITING if real_time else WAITING_ACCELERATED
     with Recorder(path, stream.skeleton, tell=warn, waiting=waiting) as recorder:
@@ -122,18 +141,21 @@ def soaked(path: Path, seconds: float, *, real_time: bool) -> Soak:
         loop = _loop(RecordedStream(stream, log.note))
         ticker = Ticker(RATE)
         with long_lived():
+            before = stolen_time()
             for tick in range(ticks):
                 began, worked = time.perf_counter(), time.thread_time()
                 loop.tick()
                 loop.settle()
                 spent[tick] = time.perf_counter() - began
                 work[tick] = time.thread_time() - worked
+                now = stolen_time()
+                stolen[tick], before = now - before, now
                 if tick % TICKS_A_SAMPLE == 0:
                     memory[tick // TICKS_A_SAMPLE] = resident_memory()
                 clock.now = (tick + 1) / RATE
                 if real_time:
                     ticker.wait()
-    return Soak(log.count, log.found_in(path), spent, work, memory)
+    return Soak(log.count, log.found_in(path), spent, work, stolen, memory)
 
 
 def _loop(stream: RecordedStream) -> FrameLoop:
