@@ -34,6 +34,10 @@ class Ticker:
             self._sleep(self._next - now)
         self._next = max(self._next, now) + self._period
 
+    def is_due(self) -> bool:
+        """Whether the next tick should have begun already."""
+        return self._clock() >= self._next
+
 
 class StageTimer:
     """How long the stages of the current tick have taken; a stage may run more than once.

@@ -127,6 +127,10 @@ class FrameLoop:
                 for puppet in act.puppets:
                     puppet.settle()
 
+    def hurry(self) -> None:
+        """Leave the surfaces as they were shown: there is no time to settle them."""
+        self._unsettled = False
+
     def _idle(self) -> None:
         """Go on showing what there is, though no frame has come: camera and light may change."""
         due = self._clock() - self._pictured_at >= self._picture_step

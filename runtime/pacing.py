@@ -21,6 +21,10 @@ class Pace(Protocol):
         """Return when the next tick should begin."""
         ...
 
+    def is_due(self) -> bool:
+        """Whether the next tick should have begun already."""
+        ...
+
 
 @runtime_checkable
 class Waking(Protocol):
@@ -63,6 +67,31 @@ class OnArrival:
         patience = LULL if self._flowing else 1.0 / TICKS
         self._flowing = self._stream.wait(max(self._began + patience - self._clock(), 0.0))
         self._began = self._clock()
+
+    def is_due(self) -> bool:
+        """Whether a frame is there already."""
+        return self._stream.wait(0.0)
+
+
+class SpareTime:
+    """Says after each tick whether there is time for what can be left out.
+
+    There is none where the next tick is due already: a tick that a busy machine held up is not made
+    longer still. It is never left out twice running, so that a show that is always late has it for
+    every other tick.
+
+    Args:
+        pace: knows when the next tick is due.
+    """
+
+    def __init__(self, pace: Pace) -> None:
+        self._pace = pace
+        self._was_left = True
+
+    def is_left(self) -> bool:
+        """Whether there is time after this tick; to be asked once a tick."""
+        self._was_left = not self._was_left or not self._pace.is_due()
+        return self._was_left
 
 
 def pace_of(stream: SkeletonStream) -> Pace:

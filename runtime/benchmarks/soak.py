@@ -25,6 +25,7 @@ from runtime.conditioning.switches import for_live
 from runtime.director import Choices, Director
 from runtime.loop import FrameLoop
 from runtime.output.report import Report
+from runtime.pacing import SpareTime
 from runtime.pauses import long_lived
 from runtime.performer import Performer
 from runtime.puppet import Puppet
@@ -140,12 +141,16 @@ def soaked(path: Path, seconds: float, *, real_time: bool) -> Soak:
         log = _Log(recorder.offer if real_time else recorder.write, 2 * ticks * PERFORMERS)
         loop = _loop(RecordedStream(stream, log.note))
         ticker = Ticker(RATE)
+        spare = SpareTime(ticker)
         with long_lived():
             before = stolen_time()
             for tick in range(ticks):
                 began, worked = time.perf_counter(), time.thread_time()
                 loop.tick()
-                loop.settle()
+                if not real_time or spare.is_left():
+                    loop.settle()
+                else:
+                    loop.hurry()
                 spent[tick] = time.perf_counter() - began
                 work[tick] = time.thread_time() - worked
                 now = stolen_time()

@@ -36,7 +36,7 @@ from runtime.interrupt import held
 from runtime.loop import FrameLoop
 from runtime.mapping import Mapping, read_mapping
 from runtime.output.report import Report
-from runtime.pacing import TICKS, pace_of
+from runtime.pacing import TICKS, SpareTime, pace_of
 from runtime.pauses import long_lived
 from runtime.performer import Performer
 from runtime.progress import Progress
@@ -185,6 +185,7 @@ class _Show:
         if self._window is not None and self._theatre is not None:
             controls = Controls(self._window, self._theatre, desk)
         pace = None if options.fast else pace_of(self._source.stream)
+        spare = None if pace is None else SpareTime(pace)
         self._closing.enter_context(long_lived())
         while not (self._stream.ended or desk.leaving):
             with held():  # so that all outputs have the same frames
@@ -196,7 +197,10 @@ class _Show:
                 controls.serve()
             if self._remote is not None:
                 self._remote.serve(desk)
-            loop.settle()
+            if spare is None or spare.is_left():
+                loop.settle()
+            else:
+                loop.hurry()
             if pace is not None:
                 pace.wait()
 

@@ -42,6 +42,18 @@ def test_the_first_tick_is_at_once(clock: Clock) -> None:
     assert clock.slept == []
 
 
+def test_a_tick_is_due_when_its_time_has_come(clock: Clock) -> None:
+    ticker = Ticker(50.0, clock=clock, sleep=clock.sleep)
+    ticker.wait()
+    assert not ticker.is_due()
+    clock.now += 0.019
+    assert not ticker.is_due()
+    clock.now += 0.002
+    assert ticker.is_due()
+    ticker.wait()
+    assert not ticker.is_due()
+
+
 def test_a_late_tick_comes_at_once_and_is_not_made_up_for(clock: Clock) -> None:
     ticker = Ticker(10.0, clock=clock, sleep=clock.sleep)
     ticker.wait()

@@ -197,6 +197,21 @@ def test_it_does_not_matter_to_what_is_shown_who_settles_and_when(puppet: Puppet
     np.testing.assert_array_equal(*shown)
 
 
+def test_a_hurried_show_goes_on_from_what_was_shown(puppet: Puppet) -> None:
+    shown = []
+    for leave in (FrameLoop.settle, FrameLoop.hurry):
+        player, kept = Player(record(waving(9)), EveryFrame()), Kept()
+        loop = loop_of(player, [puppet], [[kept]])
+        while not player.ended:
+            loop.tick()
+            leave(loop)
+        shown.append(np.array([frame.vertices for frame in kept.frames]))
+    patient, hurried = shown
+    np.testing.assert_array_equal(hurried[0], patient[0])
+    gaps = np.abs(hurried - patient).max(axis=(1, 2))
+    assert 0.0 < gaps.max() < 0.02 * np.ptp(patient)
+
+
 def test_what_a_slow_loop_skips_is_counted_and_recorded(puppet: Puppet) -> None:
     now = [50.0]
     player = Player(record(waving(10)), RealTime(clock=lambda: now[0]))

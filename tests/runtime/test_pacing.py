@@ -13,7 +13,7 @@ from devices.simulator import Simulator
 from devices.skeleton import SkeletonFrame
 from devices.stream import open_stream
 from runtime.clock import Ticker
-from runtime.pacing import LULL, MOST_TICKS, TICKS, OnArrival, pace_of
+from runtime.pacing import LULL, MOST_TICKS, TICKS, OnArrival, SpareTime, pace_of
 
 
 class Arrivals:
@@ -71,6 +71,29 @@ def test_a_burst_is_taken_together_and_a_flood_in_steps() -> None:
     assert third[1] == 0
     flood = ticks(Arrivals(*np.arange(0.0, 0.1, 1e-4)), 20)
     np.testing.assert_allclose(np.diff([time for time, _ in flood]), 1.0 / MOST_TICKS)
+
+
+def test_what_can_be_left_out_is_left_out_once_where_a_tick_is_late() -> None:
+    arrivals = Arrivals()
+    ticker = Ticker(TICKS, clock=arrivals.clock, sleep=arrivals.sleep)
+    spare, left = SpareTime(ticker), []
+    for work in (0.01, 0.01, 0.02, 0.02, 0.02, 0.02, 0.01, 0.02):
+        ticker.wait()
+        arrivals.sleep(work)
+        left.append(spare.is_left())
+    assert left == [True, True, False, True, False, True, True, False]
+
+
+def test_a_tick_is_due_when_a_frame_waits() -> None:
+    arrivals = Arrivals(0.01, 0.02)
+    pace = OnArrival(arrivals, clock=arrivals.clock, sleep=arrivals.sleep)
+    pace.wait()
+    arrivals.poll()
+    assert not pace.is_due()
+    arrivals.sleep(0.009)
+    assert not pace.is_due()
+    arrivals.sleep(0.002)
+    assert pace.is_due()
 
 
 def test_what_can_be_waited_for_is_waited_for() -> None:
