@@ -62,7 +62,7 @@ def parse_record(opcode: int, body: bytes) -> Record | None:
             return message
         read = _READERS.get(opcode)
         return None if read is None else read(stream)
-    except (McapError, struct.error, ValueError) as error:
+    except (McapError, struct.error, ValueError, OverflowError) as error:
         raise DamagedRecordError(f"a record of kind {opcode} is damaged") from error
 
 

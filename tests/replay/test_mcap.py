@@ -276,6 +276,23 @@ def test_a_damaged_chunk_costs_only_its_own_frames(tmp_path: Path, finished: byt
         assert f"at byte {at}" in recording.notes[0]
 
 
+def test_a_chunk_that_claims_more_than_any_machine_can_hold_is_passed_over(
+    tmp_path: Path, finished: bytes
+) -> None:
+    path = tmp_path / "damaged.mcap"
+    path.write_bytes(finished)
+    with path.open("rb") as file:
+        file.seek(8)
+        chunks = [offset for offset, r in walk(file, len(finished)) if isinstance(r, Chunk)]
+    damaged = bytearray(finished)
+    length = chunks[1] + 9 + 28 + len("....zstd")  # behind times, size, CRC and the codec's name
+    damaged[length : length + 8] = (2**63 + 508).to_bytes(8, "little")
+    path.write_bytes(damaged)
+    recording = read_mcap(path)
+    assert 0 < len(recording) < 300
+    assert f"at byte {chunks[1]}" in recording.notes[0]
+
+
 @settings(max_examples=150, deadline=None)
 @given(st.data())
 def test_mutated_bytes_never_surprise(
