@@ -170,7 +170,7 @@ class Director:
                 source = self._performer.limb(source)
             if len(source) > 1 and len(target) > 1:
                 drives.append(Drive(source, target, self._choices.flip))
-        return Mapping(tuple(drives), match.score, match.root)
+        return Mapping(tuple(drives), match.score)
 
     def accept(self) -> None:
         """Let the matches shown perform from now on; the pose just struck is the rest state."""

@@ -37,12 +37,10 @@ class Mapping:
     Attributes:
         drives: the pairs of polylines, those nearer to the target's root first.
         score: the match's similarity, the sum of cosines of section 4.2; NaN when made by hand.
-        root: the target node that all polylines lead away from, where it is known.
     """
 
     drives: tuple[Drive, ...]
     score: float = float("nan")
-    root: int | None = None
 
 
 def read_mapping(path: Path, source: Skeleton, target: Skeleton) -> Mapping:

@@ -108,10 +108,9 @@ class Puppet:
             InputError: chains that share a bone, or lead towards one another.
         """
         chains = tuple(drive.target for drive in mapping.drives)
-        roots = [self.root, chains[0][0]]
-        if mapping.root is not None:
-            roots.insert(1, mapping.root)
-        for root in roots:
+        # Where any node will do, the nearest start of a chain does too, and moves it alike: no
+        # driven bone lies between them.
+        for root in dict.fromkeys((self.root, *(chain[0] for chain in chains))):
             try:
                 self._drive(chains, root)
             except ValueError as error:
@@ -120,8 +119,8 @@ class Puppet:
                 break
         else:
             raise InputError(
-                f"{self.character.name} cannot be driven so: {refusal}; let every polyline lead "
-                f"away from node {self.root} or from the start of the first, and none share a bone"
+                f"{self.character.name} cannot be driven so: {refusal}; let all polylines lead "
+                f"away from one node, as from {self.root}, and none share a bone"
             ) from refusal
         maps = [
             map_chain(

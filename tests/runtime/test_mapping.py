@@ -32,14 +32,12 @@ def written(tmp_path: Path, content: object) -> Path:
 
 
 def test_a_mapping_is_read_as_it_was_written(tmp_path: Path) -> None:
-    mapping = Mapping(
-        (Drive((0, 1, 2), (0, 1)), Drive((1, 3), (2, 1, 0, 3), flip=True)), score=1.5, root=0
-    )
+    drives = Drive((0, 1, 2), (0, 1)), Drive((1, 3), (2, 1, 0, 3), flip=True)
+    mapping = Mapping(drives, score=1.5)
     path = written(tmp_path, mapping_as_json(mapping, SOURCE))
     read = read_mapping(path, SOURCE, TARGET)
     assert read.drives == mapping.drives
     assert np.isnan(read.score)
-    assert read.root is None
     assert mapping_as_json(read, SOURCE)["score"] is None
     assert mapping_as_json(mapping, SOURCE)["score"] == 1.5
 
