@@ -73,25 +73,53 @@ class OnArrival:
         return self._stream.wait(0.0)
 
 
-class SpareTime:
-    """Says after each tick whether there is time for what can be left out.
+class AtOnce:
+    """One tick right after the other, and each has all the time that it takes."""
 
-    There is none where the next tick is due already: a tick that a busy machine held up is not made
-    longer still. It is never left out twice running, so that a show that is always late has it for
-    every other tick.
+    def wait(self) -> None:
+        """Return at once."""
+
+    def is_due(self) -> bool:
+        """Never: nobody waits for the next tick."""
+        return False
+
+
+class Settling(Protocol):
+    """Surfaces that come nearer to rest between ticks, as those of a `FrameLoop`."""
+
+    def settle(self) -> None:
+        """Bring them nearer to rest."""
+        ...
+
+    def hurry(self) -> None:
+        """Leave them as they were shown."""
+        ...
+
+
+class SpareTime:
+    """What is left of a tick's time once it has been shown: the surfaces settle in it.
+
+    Where the next tick is due already they do not: a tick that a busy machine held up is not made
+    longer still. They are never left out twice running, so that a show that is always late settles
+    them after every other tick.
 
     Args:
         pace: knows when the next tick is due.
+        surfaces: what settles.
     """
 
-    def __init__(self, pace: Pace) -> None:
+    def __init__(self, pace: Pace, surfaces: Settling) -> None:
         self._pace = pace
-        self._was_left = True
+        self._surfaces = surfaces
+        self._has_settled = True
 
-    def is_left(self) -> bool:
-        """Whether there is time after this tick; to be asked once a tick."""
-        self._was_left = not self._was_left or not self._pace.is_due()
-        return self._was_left
+    def spend(self) -> None:
+        """Settle the surfaces if there is time; to be called once a tick."""
+        self._has_settled = not self._has_settled or not self._pace.is_due()
+        if self._has_settled:
+            self._surfaces.settle()
+        else:
+            self._surfaces.hurry()
 
 
 def pace_of(stream: SkeletonStream) -> Pace:

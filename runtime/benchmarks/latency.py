@@ -27,7 +27,7 @@ from runtime.director import Choices, Director
 from runtime.interrupt import held
 from runtime.loop import FrameLoop
 from runtime.output.report import Report
-from runtime.pacing import OnArrival
+from runtime.pacing import OnArrival, SpareTime
 from runtime.pauses import long_lived
 from runtime.performer import Performer, Pose
 from runtime.puppet import Motion, Puppet
@@ -205,12 +205,13 @@ class _Show:
         """Perform until so many frames have come, or none comes any more."""
         stream, theatre = self._stream, self.theatre
         pace = OnArrival(stream.stream)
+        spare = SpareTime(pace, self._loop)
         heard = time.perf_counter()
         while stream.given < count and time.perf_counter() - heard < PATIENCE:
             pace.wait()
             with held():
                 performed = self._loop.tick()
-            self._loop.settle()
+            spare.spend()
             if performed and stream.newest is not None:
                 heard = time.perf_counter()
                 newest = stream.newest

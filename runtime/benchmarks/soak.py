@@ -25,7 +25,7 @@ from runtime.conditioning.switches import for_live
 from runtime.director import Choices, Director
 from runtime.loop import FrameLoop
 from runtime.output.report import Report
-from runtime.pacing import SpareTime
+from runtime.pacing import AtOnce, SpareTime
 from runtime.pauses import long_lived
 from runtime.performer import Performer
 from runtime.puppet import Puppet
@@ -140,17 +140,14 @@ def soaked(path: Path, seconds: float, *, real_time: bool) -> Soak:
     with Recorder(path, stream.skeleton, tell=warn, waiting=waiting) as recorder:
         log = _Log(recorder.offer if real_time else recorder.write, 2 * ticks * PERFORMERS)
         loop = _loop(RecordedStream(stream, log.note))
-        ticker = Ticker(RATE)
-        spare = SpareTime(ticker)
+        pace = Ticker(RATE) if real_time else AtOnce()
+        spare = SpareTime(pace, loop)
         with long_lived():
             before = stolen_time()
             for tick in range(ticks):
                 began, worked = time.perf_counter(), time.thread_time()
                 loop.tick()
-                if not real_time or spare.is_left():
-                    loop.settle()
-                else:
-                    loop.hurry()
+                spare.spend()
                 spent[tick] = time.perf_counter() - began
                 work[tick] = time.thread_time() - worked
                 now = stolen_time()
@@ -158,8 +155,7 @@ def soaked(path: Path, seconds: float, *, real_time: bool) -> Soak:
                 if tick % TICKS_A_SAMPLE == 0:
                     memory[tick // TICKS_A_SAMPLE] = resident_memory()
                 clock.now = (tick + 1) / RATE
-                if real_time:
-                    ticker.wait()
+                pace.wait()
     return Soak(log.count, log.found_in(path), spent, work, stolen, memory)
 
 

@@ -36,7 +36,7 @@ from runtime.interrupt import held
 from runtime.loop import FrameLoop
 from runtime.mapping import Mapping, read_mapping
 from runtime.output.report import Report
-from runtime.pacing import TICKS, SpareTime, pace_of
+from runtime.pacing import TICKS, AtOnce, SpareTime, pace_of
 from runtime.pauses import long_lived
 from runtime.performer import Performer
 from runtime.progress import Progress
@@ -184,8 +184,8 @@ class _Show:
         controls = None
         if self._window is not None and self._theatre is not None:
             controls = Controls(self._window, self._theatre, desk)
-        pace = None if options.fast else pace_of(self._source.stream)
-        spare = None if pace is None else SpareTime(pace)
+        pace = AtOnce() if options.fast else pace_of(self._source.stream)
+        spare = SpareTime(pace, loop)
         self._closing.enter_context(long_lived())
         while not (self._stream.ended or desk.leaving):
             with held():  # so that all outputs have the same frames
@@ -197,12 +197,8 @@ class _Show:
                 controls.serve()
             if self._remote is not None:
                 self._remote.serve(desk)
-            if spare is None or spare.is_left():
-                loop.settle()
-            else:
-                loop.hurry()
-            if pace is not None:
-                pace.wait()
+            spare.spend()
+            pace.wait()
 
     def _open_loop(self) -> FrameLoop:
         """The loop with all that keeps the show; opened last, when nothing else can fail."""

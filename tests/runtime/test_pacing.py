@@ -13,7 +13,7 @@ from devices.simulator import Simulator
 from devices.skeleton import SkeletonFrame
 from devices.stream import open_stream
 from runtime.clock import Ticker
-from runtime.pacing import LULL, MOST_TICKS, TICKS, OnArrival, SpareTime, pace_of
+from runtime.pacing import LULL, MOST_TICKS, TICKS, AtOnce, OnArrival, Pace, SpareTime, pace_of
 
 
 class Arrivals:
@@ -73,15 +73,42 @@ def test_a_burst_is_taken_together_and_a_flood_in_steps() -> None:
     np.testing.assert_allclose(np.diff([time for time, _ in flood]), 1.0 / MOST_TICKS)
 
 
-def test_what_can_be_left_out_is_left_out_once_where_a_tick_is_late() -> None:
+class Surfaces:
+    """Notes what is asked of them."""
+
+    def __init__(self) -> None:
+        self.settled: list[bool] = []
+
+    def settle(self) -> None:
+        self.settled.append(True)
+
+    def hurry(self) -> None:
+        self.settled.append(False)
+
+
+def settled(pace: Pace, arrivals: Arrivals, *work: float) -> list[bool]:
+    """After which ticks surfaces settled that were given these times [s] to be shown."""
+    surfaces = Surfaces()
+    spare = SpareTime(pace, surfaces)
+    for seconds in work:
+        pace.wait()
+        arrivals.sleep(seconds)
+        spare.spend()
+    return surfaces.settled
+
+
+def test_surfaces_are_left_unsettled_once_where_a_tick_is_late() -> None:
     arrivals = Arrivals()
     ticker = Ticker(TICKS, clock=arrivals.clock, sleep=arrivals.sleep)
-    spare, left = SpareTime(ticker), []
-    for work in (0.01, 0.01, 0.02, 0.02, 0.02, 0.02, 0.01, 0.02):
-        ticker.wait()
-        arrivals.sleep(work)
-        left.append(spare.is_left())
-    assert left == [True, True, False, True, False, True, True, False]
+    work = 0.01, 0.01, 0.02, 0.02, 0.02, 0.02, 0.01, 0.02
+    expected = [True, True, False, True, False, True, True, False]
+    assert settled(ticker, arrivals, *work) == expected
+
+
+def test_surfaces_always_settle_where_nobody_waits() -> None:
+    arrivals = Arrivals()
+    assert settled(AtOnce(), arrivals, 0.01, 0.2, 0.2) == [True, True, True]
+    assert arrivals.now == pytest.approx(0.41)
 
 
 def test_a_tick_is_due_when_a_frame_waits() -> None:
