@@ -32,9 +32,11 @@ class Edges:
     @classmethod
     def of(cls, vertices: Array, faces: Indices) -> Self:
         """Find the edges of a mesh, vertices (N, 3) at rest and faces (F, 3)."""
-        sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1).astype(np.int64)
+        tails = np.asarray(faces, dtype=np.int64)
+        heads = np.roll(tails, -1, axis=1)
         count = max(len(vertices), 1)
-        keys = np.unique(sides[:, 0] * count + sides[:, 1])  # a number sorts faster than a row
+        keys = np.sort((np.minimum(tails, heads) * count + np.maximum(tails, heads)).ravel())
+        keys = keys[np.diff(keys, prepend=-1) > 0]  # np.unique hashes first: twice the time
         ends = np.stack([keys // count, keys % count], axis=1)
         lengths = _lengths(vertices, ends)
         extent = np.ptp(vertices, axis=0).max(initial=0.0) if len(vertices) else 0.0

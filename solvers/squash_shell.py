@@ -42,7 +42,9 @@ def _fans(faces: Ints, part_of: Ints) -> Ints:
     """
     tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     count = len(part_of)
-    is_open = ~np.isin(tails * count + heads, heads * count + tails)
+    back = np.sort(heads * count + tails)
+    sides = tails * count + heads
+    is_open = back[np.searchsorted(back[:-1], sides)] != sides  # greater than all: the last
     tails, heads = tails[is_open], heads[is_open]
     centre_of = np.full(count, -1, dtype=np.int64)
     centre_of[part_of[tails[::-1]]] = tails[::-1]
