@@ -379,7 +379,7 @@ def test_a_stage_of_another_version_is_told_and_tells() -> None:
 
 
 def test_a_flood_from_a_stranger_leaves_the_bridge_serving() -> None:
-    stop = threading.Event()
+    stop, served = threading.Event(), threading.Event()
 
     def flood(socket: zmq.Socket) -> None:
         noise = [os.urandom(size) for size in (0, 1, 46, 300)]
@@ -389,6 +389,8 @@ def test_a_flood_from_a_stranger_leaves_the_bridge_serving() -> None:
                 with_room = socket.poll(10, zmq.POLLOUT)
                 if with_room:
                     socket.send(data, zmq.NOBLOCK)
+            if publisher.audience.stages == 2:
+                served.set()
 
     with (
         bridge() as publisher,
@@ -398,6 +400,7 @@ def test_a_flood_from_a_stranger_leaves_the_bridge_serving() -> None:
         flooding = threading.Thread(target=flood, args=(socket,))
         flooding.start()
         try:
+            assert served.wait(SOON), "its own call is one like any other"
             for number in range(1, 301):
                 publisher.write(frame(number))
             assert numbers(take_until(stream, 300)) == list(range(1, 301))
