@@ -159,8 +159,8 @@ def _add_bench(bench: argparse.ArgumentParser) -> None:
         "name",
         nargs="?",
         metavar="NAME",
-        help="arap, table1, hold, dense, tick or match, all if absent; clips, soak, kill or "
-        "latency, which take long",
+        help="arap, table1, hold, dense, tick, match or spacetime, all if absent; clips, soak, "
+        "kill or latency, which take long",
     )
     bench.add_argument("--seconds", type=positive, help="of show in `bench soak` (default 3600)")
     bench.add_argument(

@@ -11,7 +11,7 @@ from typing import Any
 from devices.errors import InputError
 from runtime.output.whole_file import check_writable, whole_file
 
-NAMES = ("arap", "table1", "hold", "dense", "tick", "match")
+NAMES = ("arap", "table1", "hold", "dense", "tick", "match", "spacetime")
 LONG = ("clips", "soak", "kill", "latency")  # only when named
 
 
