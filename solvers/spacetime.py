@@ -202,9 +202,9 @@ def _smooth(guide: _Guide) -> Array:
     blocks = [S[:-2] + 4.0 * S[1:-1] + S[2:], -2.0 * (S[1:-2] + S[2:-1]), S[2:-2]]
     blocks[0] += np.eye(3)
     pushes = solveh_banded(_banded(blocks), steps.ravel(), lower=True, check_finite=False)
-    spread = np.zeros((frames + 2, 3))
-    spread[2:-2] = guide.stiffness**2 * pushes.reshape(-1, 3)
-    moved: Array = np.matmul(guide.freedom, np.diff(spread, 2, axis=0)[:, :, None])[:, :, 0]
+    padded = np.zeros((frames + 2, 3))  # so that its differences are those across
+    padded[2:-2] = guide.stiffness**2 * pushes.reshape(-1, 3)
+    moved: Array = np.matmul(guide.freedom, np.diff(padded, 2, axis=0)[:, :, None])[:, :, 0]
     return guide.path - moved
 
 
@@ -229,7 +229,8 @@ def _meet(guides: Mapping[int, _Guide], constraints: Sequence[Constraint]) -> di
     freedom = sp.block_diag(
         [_along_diagonal(guide.freedom) for guide in guides.values()], format="csr"
     )
-    steps = sp.diags([1.0, -2.0, 1.0], [0, 1, 2], shape=(max(frames - 2, 0), frames))
+    each = sp.eye(frames, format="csr")
+    steps = each[2:] - 2.0 * each[1:-1] + each[:-2]
     smooth = sp.block_diag(
         [guide.stiffness * sp.kron(steps, sp.eye(3)) for guide in guides.values()], format="csr"
     )
@@ -271,9 +272,9 @@ def _rows(
                 column = 3 * (places[joint] * frames + frame) + axis
                 data.append((factor, len(values), column))
             values.append(value)
-    factors, row, column_ = zip(*data, strict=True)
+    factors, rows, columns = zip(*data, strict=True)
     shape = len(values), 3 * frames * len(places)
-    return sp.csr_matrix((factors, (row, column_)), shape=shape), np.array(values)
+    return sp.csr_matrix((factors, (rows, columns)), shape=shape), np.array(values)
 
 
 def _check_met(missed: Array, constraints: Sequence[Constraint]) -> None:
@@ -314,8 +315,8 @@ def _checked(
 def _check_constraints(constraints: Sequence[Constraint], shape: tuple[int, ...]) -> None:
     frames, joints = shape
     for number, constraint in enumerate(constraints):
-        if not constraint.terms:
-            raise ValueError(f"expected at least one position in constraint {number}")
+        if not (constraint.terms and constraint.axes):
+            raise ValueError(f"expected at least one position and axis in constraint {number}")
         for frame, joint, factor in constraint.terms:
             if not (0 <= frame < frames and 0 <= joint < joints):
                 raise ValueError(

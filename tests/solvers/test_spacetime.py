@@ -223,6 +223,10 @@ def test_short_paths_are_paths(frames: int) -> None:
     found = retarget_trajectories(joints, controls, wander(frames))
     assert found.shape == (frames, 2, 3)
     assert np.isfinite(found).all()
+    held = held_at(frames - 1, 1, (0.1, 0.2, 0.3))
+    met = retarget_trajectories(joints, controls, wander(frames), constraints=[held])
+    np.testing.assert_allclose(met[-1, 1], held.value, atol=1e-9)
+    np.testing.assert_array_equal(met[:, 0], found[:, 0])
 
 
 def test_what_is_given_is_checked() -> None:
@@ -254,7 +258,13 @@ def test_what_is_given_is_checked() -> None:
             lambda: retarget_trajectories(
                 joints, controls, path, constraints=[Constraint((), (1.0,), (0,))]
             ),
-            "at least one position in constraint 0",
+            "at least one position and axis in constraint 0",
+        ),
+        (
+            lambda: retarget_trajectories(
+                joints, controls, path, constraints=[held_at(1, 1, (), axes=())]
+            ),
+            "at least one position and axis in constraint 0",
         ),
     ):
         with pytest.raises(ValueError, match=told):
