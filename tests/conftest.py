@@ -1,7 +1,8 @@
-"""Shared fixtures: where the real recordings and meshes lie, a GL context, a seed."""
+"""Shared fixtures: where the real recordings and meshes lie, a GL context, a seed, Ctrl-C."""
 
 from __future__ import annotations
 
+import signal
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -37,3 +38,13 @@ def context() -> Iterator[moderngl.Context]:
 @pytest.fixture(autouse=True)
 def _seeded() -> None:
     np.random.seed(0)
+
+
+@pytest.fixture(autouse=True, scope="session")
+def _heard() -> Iterator[None]:
+    """Programs that tests start hear Ctrl-C, also where the tests run behind `&` or `nohup`."""
+    before = signal.getsignal(signal.SIGINT)
+    if before is signal.SIG_IGN:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
