@@ -13,6 +13,7 @@ from pathlib import Path
 from devices.errors import InputError
 from runtime.arguments import positive, size, whole
 from runtime.interrupt import Interrupted, interruptible
+from runtime.pauses import uncollected
 from runtime.show_options import add_show_options
 
 Command = Callable[[argparse.Namespace], int]
@@ -41,7 +42,10 @@ def _command(module: str, function: str) -> Command:
     """A command that is imported when it is run, so that `--help` answers at once."""
 
     def run(options: argparse.Namespace) -> int:
-        command: Command = getattr(importlib.import_module(f"runtime.commands.{module}"), function)
+        with uncollected():
+            command: Command = getattr(
+                importlib.import_module(f"runtime.commands.{module}"), function
+            )
         return command(options)
 
     return run

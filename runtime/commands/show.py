@@ -37,7 +37,7 @@ from runtime.loop import FrameLoop
 from runtime.mapping import Mapping, read_mapping
 from runtime.output.report import Report
 from runtime.pacing import TICKS, AtOnce, SpareTime, pace_of
-from runtime.pauses import long_lived
+from runtime.pauses import long_lived, uncollected
 from runtime.performer import Performer
 from runtime.progress import Progress
 from runtime.provenance import provenance
@@ -114,7 +114,10 @@ def _show(options: argparse.Namespace, open_source: Callable[[], _Source]) -> in
     check_outputs(options)
     closing = ExitStack()
     try:
-        _Show(options, open_source(), closing).run()
+        with uncollected():
+            show = _Show(options, open_source(), closing)
+            show.prepare()
+        show.run()
     finally:
         with held():  # nobody's impatience leaves half a file
             closing.close()
@@ -169,13 +172,18 @@ class _Show:
         self._theatre = self._open_theatre()
         self._acts = self._call_acts()
 
+    def prepare(self) -> None:
+        """Go through what is to be performed, where that is known."""
+        recording = self._source.recording
+        if recording is None:
+            return
+        filled = self._rehearse(recording)
+        if self._theatre is not None:
+            self._theatre.frame_all(filled)
+
     def run(self) -> None:
         """Perform until the stream ends or the window is closed."""
         options, recording = self._options, self._source.recording
-        if recording is not None:
-            filled = self._rehearse(recording)
-            if self._theatre is not None:
-                self._theatre.frame_all(filled)
         with held():
             loop = self._open_loop()
             desk = self._open_desk(loop)

@@ -7,7 +7,7 @@ import weakref
 
 import pytest
 
-from runtime.pauses import long_lived
+from runtime.pauses import long_lived, uncollected
 
 
 class Ring:
@@ -28,6 +28,22 @@ def test_what_was_there_is_left_alone_and_what_comes_is_collected() -> None:
         assert new() is None
     gc.collect()
     assert old() is None
+
+
+def test_nothing_is_looked_for_while_a_show_is_set_up() -> None:
+    with uncollected():
+        assert not gc.isenabled()
+    assert gc.isenabled()
+    with pytest.raises(KeyboardInterrupt), uncollected():
+        raise KeyboardInterrupt
+    assert gc.isenabled()
+    gc.disable()
+    try:
+        with uncollected():
+            pass
+        assert not gc.isenabled()  # whoever had switched it off is not overruled
+    finally:
+        gc.enable()
 
 
 def test_a_show_that_fails_leaves_the_collector_as_it_was() -> None:
