@@ -51,6 +51,9 @@ def restrain(puppet: Puppet, poses: Sequence[Pose]) -> Array:
 class _Trial:
     """T poses that a puppet of D limbs goes through.
 
+    What a pose showed before a limb was held back stays as it was: smaller turns stretch no pose
+    more, so it is a bound from above until the pose is tried again.
+
     Attributes:
         boxes: (T, 2, 3) [m] corners of what it fills in each.
         limb_edges: (T, D, B) how many of the edges that each limb pulls at stretch how much.
@@ -61,18 +64,34 @@ class _Trial:
         self._puppet = puppet
         self._poses = poses
         self._pulled = [np.flatnonzero(edges) for edges in puppet.pulls().T]
+        self._gains = np.empty((len(poses), len(self._pulled)))
         self.boxes = np.empty((len(poses), 2, 3))
         self.limb_edges = np.empty((len(poses), len(self._pulled), _BINS), dtype=np.int64)
         self.all_edges = np.empty((len(poses), _BINS), dtype=np.int64)
         for number in range(len(poses)):
-            self._try(number)
+            self.attempt(number)
 
     def repeat(self, tightness: Array) -> None:
-        """Try again those that were not easy, (T,): smaller turns stretch no pose more."""
+        """Try again those that were not easy, (T,)."""
         for number in np.flatnonzero(tightness > EASY * MOST_STRETCH).tolist():
-            self._try(number)
+            self.attempt(number)
 
-    def _try(self, number: int) -> None:
+    def worst(self, limb: int) -> tuple[int, float]:
+        """The pose that is worst for what a limb pulls at, and how tight that is there.
+
+        Where it is not too tight anywhere, a pose and a bound for it.
+        """
+        while True:
+            tight = _tight(self.limb_edges[:, limb], OF_LIMB)
+            number = int(np.argmax(tight))
+            is_bound = not np.array_equal(self._gains[number], self._puppet.gains)
+            if tight[number] <= MOST_STRETCH or not is_bound:
+                return number, float(tight[number])
+            self.attempt(number)
+
+    def attempt(self, number: int) -> None:
+        """Try one pose."""
+        self._gains[number] = self._puppet.gains
         self.boxes[number], stretch = self._puppet.attempt(self._poses[number])
         self.all_edges[number] = self.limb_edges[number] = 0
         count(stretch, _BIN, self.all_edges[number])
@@ -93,23 +112,26 @@ def _tightness(trial: _Trial) -> Array:
     return tight
 
 
-def _steps(tight: Array) -> Array:
+def _steps(tight: Array | float) -> Array:
     """By what share limbs as tight as this are held back in a round; 1 for those that are not."""
     shares = np.clip(MOST_STRETCH / np.maximum(tight, MOST_STRETCH), STEPS[0], 1.0)
     return np.where(shares < 1.0, np.minimum(shares, STEPS[1]), 1.0)
 
 
 def _spare(puppet: Puppet, trial: _Trial, limb: int) -> None:
-    """Hold one limb back until its edges are crushed in no pose, or that helps no more."""
-    tight = _tight(trial.limb_edges[:, limb], OF_LIMB)
+    """Hold one limb back until its edges are crushed in no pose, or that helps no more.
+
+    The worst pose says how far, and whether it helps; others are tried again only where they may
+    have become the worst.
+    """
     for _ in range(ROUNDS):
-        worst, gain = tight.max(), puppet.gains[limb]
-        if worst <= MOST_STRETCH:
+        number, tight = trial.worst(limb)
+        if tight <= MOST_STRETCH:
             return
-        puppet.gains[limb] *= _steps(worst)
-        trial.repeat(tight)
-        tight, before = _tight(trial.limb_edges[:, limb], OF_LIMB), tight
-        if tight.max() > HELPED * worst:
+        gain = puppet.gains[limb]
+        puppet.gains[limb] *= _steps(tight)
+        trial.attempt(number)
+        if float(_tight(trial.limb_edges[number, limb], OF_LIMB)) > HELPED * tight:
             puppet.gains[limb] = gain
-            trial.repeat(before)
+            trial.attempt(number)
             return
