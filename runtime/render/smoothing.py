@@ -76,9 +76,10 @@ def smoothing_groups(
     tail, head = faces, np.roll(faces, -1, axis=1)
     first, second = corner, np.roll(corner, -1, axis=1)  # corners at tail and head
     low, high = np.minimum(tail, head), np.maximum(tail, head)
-    order = np.lexsort((high.ravel(), low.ravel()))
+    edge = (low.astype(np.int64) * len(vertices) + high).ravel()
+    order = np.argsort(edge, kind="stable")
     a, b = order[:-1], order[1:]
-    same = (low.ravel()[a] == low.ravel()[b]) & (high.ravel()[a] == high.ravel()[b])
+    same = edge[a] == edge[b]
     opposite = tail.ravel()[a] != tail.ravel()[b]
     normals, area = _unit_face_normals(vertices, faces)
     turn = np.einsum("ij,ij->i", normals[a // 3], normals[b // 3])
@@ -105,15 +106,15 @@ def is_closed(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> bool:
     """Whether no inside can be seen: every piece watertight and turned outward."""
     tail, head = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     count = len(vertices)
-    forward = tail.astype(np.int64) * count + head
-    backward = head.astype(np.int64) * count + tail
-    if len(np.unique(forward)) != len(forward) or not np.isin(forward, backward).all():
+    forward = np.sort(tail.astype(np.int64) * count + head)
+    backward = np.sort(head.astype(np.int64) * count + tail)
+    if (np.diff(forward) == 0).any() or not np.array_equal(forward, backward):
         return False
     links = coo_array((np.ones(len(tail), dtype=np.int8), (tail, head)), (count, count))
     piece = connected_components(links, directed=False)[1][faces[:, 0]]
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     volume = np.bincount(piece, weights=np.einsum("ij,ij->i", a, np.cross(b, c)))
-    return bool((volume[np.unique(piece)] > 0.0).all())
+    return bool((volume[np.bincount(piece) > 0] > 0.0).all())
 
 
 class DeformingNormals:
