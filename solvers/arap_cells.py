@@ -112,6 +112,9 @@ def _lay_out(vertices: Floats, edges: WeightedEdges, terms: Terms, *, sharing: i
     i, j = edges.pairs[:, 0], edges.pairs[:, 1]
     keys = np.concatenate([i * count + j, j * count + i])
     order = np.argsort(keys, kind="stable")
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    twins = place[(order + len(i)) % max(len(order), 1)]  # i -> j lies so far from j -> i in keys
     keys = keys[order]
     cells, neighbours = keys // count, keys % count
 
@@ -123,7 +126,6 @@ def _lay_out(vertices: Floats, edges: WeightedEdges, terms: Terms, *, sharing: i
         for axis in range(3):
             u[:, axis] += weighted_sums(slots, sign * pull[outer, axis], len(keys))
     own = np.stack([-weighted_sums(cells, u[:, axis], count) for axis in range(3)], axis=1)
-    twins = np.searchsorted(keys, neighbours * count + cells)
     weights = np.tile(edges.weights, 2)[order]
     half_edges = Cells(
         starts=np.searchsorted(cells, np.arange(count + 1)).astype(np.uint32),

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
+from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
 from solvers.limbs import bones_in_trunk, closest_bones, limbs
@@ -140,12 +140,11 @@ def _ring(offsets: Array, tangent: Array) -> Indices:
     return near[chosen]
 
 
-def _components(count: int, faces: Indices) -> tuple[int, Indices]:
-    rows = np.concatenate([faces[:, 0], faces[:, 1]])
-    columns = np.concatenate([faces[:, 1], faces[:, 2]])
-    graph = coo_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
-    number, label = connected_components(graph, directed=False)
-    return int(number), label.astype(np.int64)
+def _one_rings(count: int, faces: Indices) -> csr_array:
+    """(N, N): each row has entries at those vertices that share a triangle with its own."""
+    tails = np.concatenate([faces, np.roll(faces, 1, axis=1)]).ravel()
+    heads = np.concatenate([np.roll(faces, 1, axis=1), faces]).ravel()
+    return csr_array((np.ones(len(tails)), (tails, heads)), shape=(count, count))
 
 
 def _spread(points: Array, wanted: int) -> Indices:
@@ -187,6 +186,7 @@ def bind(
     owner = _owners(vertices, nearest, parents, anchors, points)
     handles: list[int] = []
     groups: list[int] = []
+    one_rings = _one_rings(len(vertices), faces)
     beside = np.zeros(len(vertices), dtype=np.bool_)  # those that share a triangle with a handle
     for index, anchor in enumerate(anchors):
         own = np.flatnonzero(owner == index)
@@ -197,12 +197,11 @@ def bind(
         if len(candidates) < RING:
             candidates = own
         ring = candidates[_ring(vertices[candidates] - anchor.point, anchor.tangent)]
-        touched = np.zeros(len(vertices), dtype=np.bool_)
-        touched[ring] = True
-        beside[faces[touched[faces].any(axis=1)]] = True
+        beside[ring] = True
+        beside[one_rings[ring].indices] = True
         handles.extend(ring.tolist())
         groups.extend([index] * len(ring))
-    _hold_loose_components(vertices, faces, owner, handles, groups)
+    _hold_loose_components(vertices, one_rings, owner, handles, groups)
     return Binding(
         handles=np.array(handles, dtype=np.int64),
         anchor=np.array(groups, dtype=np.int64),
@@ -243,10 +242,10 @@ def _owners(
 
 
 def _hold_loose_components(
-    vertices: Array, faces: Indices, owner: Indices, handles: list[int], groups: list[int]
+    vertices: Array, one_rings: csr_array, owner: Indices, handles: list[int], groups: list[int]
 ) -> None:
     """Append handles for each component of the surface that too few hold to fix its turn."""
-    number, label = _components(len(vertices), faces)
+    number, label = connected_components(one_rings, directed=False)
     if number == 1:
         return
     holds = np.bincount(label[handles], minlength=number)

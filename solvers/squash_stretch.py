@@ -28,7 +28,7 @@ from numpy.typing import ArrayLike
 
 from solvers.arap import ArapSolver
 from solvers.arap_cells import SPOKES
-from solvers.laplacian import Floats, Ints
+from solvers.laplacian import Floats, Ints, weighted_sums
 from solvers.squash_kernels import (
     Fit,
     Planes,
@@ -246,9 +246,9 @@ def _normals(vertices: Floats, faces: Ints) -> Floats:
     a, b, c = (vertices[faces[:, corner]] for corner in range(3))
     vectors = np.cross(b - a, c - a)
     areas = np.linalg.norm(vectors, axis=1)
-    sums = np.zeros((len(vertices), 4))
-    for corner in range(3):
-        np.add.at(sums, faces[:, corner], np.column_stack([vectors, areas]))
+    around = np.column_stack([vectors, areas]).T
+    corners = faces.T.ravel()
+    sums = np.stack([weighted_sums(corners, np.tile(s, 3), len(vertices)) for s in around], axis=1)
     return sums[:, :3] / np.maximum(sums[:, 3:], 1e-300)
 
 
@@ -260,6 +260,22 @@ def _least_axis(C: Floats, strength: Floats, normals: Floats) -> Floats:
     return least
 
 
+def _axes_across(normals: Floats, C: Floats) -> tuple[Floats, Floats]:
+    """The axes (N, 2, 3) of C in the planes of these normals, greater extent first, and extents."""
+    every = np.arange(len(normals))
+    flattest = np.abs(normals).argmin(axis=1)
+    u = -normals * normals[every, flattest, None]
+    u[every, flattest] += 1.0
+    u /= np.linalg.norm(u, axis=1, keepdims=True)
+    v = np.cross(normals, u)
+    Cu, Cv = np.einsum("nij,nj->ni", C, u), np.einsum("nij,nj->ni", C, v)
+    uu, uv, vv = (np.einsum("ni,ni->n", a, b) for a, b in ((u, Cu), (u, Cv), (v, Cv)))
+    turn = 0.5 * np.arctan2(2.0 * uv, uu - vv)[:, None]
+    axes = np.stack([np.cos(turn) * u + np.sin(turn) * v, np.cos(turn) * v - np.sin(turn) * u], 1)
+    mean, half = 0.5 * (uu + vv), np.hypot(0.5 * (uu - vv), uv)
+    return axes, np.maximum(np.stack([mean + half, mean - half], axis=1), 0.0)
+
+
 def _planes(C: Floats, normals: Floats) -> Planes:
     """What the two states need to know of the cells, from their covariances at rest (N, 3, 3).
 
@@ -268,15 +284,12 @@ def _planes(C: Floats, normals: Floats) -> Planes:
     """
     extents = np.trace(C, axis1=1, axis2=2)
     normals = _least_axis(C, 10.0 * extents, normals)
-    flat = np.eye(3) - normals[:, :, None] * normals[:, None, :]
-    _, vectors = np.linalg.eigh(flat @ C @ flat - extents[:, None, None] * (np.eye(3) - flat))
-    axes = vectors[:, :, [2, 1]]
-    pair = np.maximum(np.einsum("nik,nij,njk->nk", axes, C, axes), 0.0)
+    axes, pair = _axes_across(normals, C)
     damped = pair**2 + (_THIN * pair.max(axis=1, keepdims=True)) ** 2
     weights = np.sqrt(np.divide(pair, damped, out=np.zeros_like(pair), where=damped > 0.0))
     inverse = np.divide(1.0, extents, out=np.zeros_like(extents), where=extents > 1e-200)
     return Planes(
         extents=np.column_stack([extents, inverse]),
-        axes=np.ascontiguousarray(np.swapaxes(axes, 1, 2)).reshape(-1, 6),
+        axes=axes.reshape(-1, 6),
         shares=np.concatenate([weights, 1.0 - weights**2 * pair], axis=1),
     )
