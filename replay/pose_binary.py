@@ -74,6 +74,7 @@ def has_pose_header(head: bytes) -> bool:
     return known and len(name) == length and name.isascii() and name.decode("latin-1").isprintable()
 
 
+@np.errstate(invalid="ignore")  # whatever a damaged file holds
 def parse_pose(data: bytes) -> PoseFile:
     """The contents of a .pose file.
 

@@ -130,6 +130,7 @@ class GltfFile:
             self._buffers[index] = content
         return self._buffers[index]
 
+    @np.errstate(invalid="ignore")  # whatever a damaged file holds
     def floats(self, index: int, *kinds: str) -> NDArray[np.float64]:
         """An accessor's elements (n, width); normalised integers become [0, 1] or [-1, 1]."""
         accessor = self.entry("accessors", index)

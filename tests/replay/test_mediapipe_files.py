@@ -150,6 +150,16 @@ def test_masked_points_are_unseen(tmp_path: Path) -> None:
     assert np.isfinite(place(recording, 1, "mid_hip")).all()
 
 
+def test_a_signalling_nan_is_unseen_and_not_warned_of(tmp_path: Path) -> None:
+    wrist = POSE_LANDMARKS.index("right_wrist")  # is somewhere else in each frame
+    there = struct.pack("<3f", *full()["POSE_WORLD_LANDMARKS"][1][2, 0, wrist])
+    assert POSE.count(there) == 1
+    damaged = POSE.replace(there, bytes.fromhex("0000817f") + there[4:])
+    recording = read_mediapipe(saved(tmp_path / "a.pose", damaged))
+    assert np.isnan(place(recording, 2, "right_wrist")).all()
+    assert np.isfinite(place(recording, 1, "right_wrist")).all()
+
+
 def test_each_person_is_a_performer(tmp_path: Path) -> None:
     recording = read_mediapipe(saved(tmp_path / "a.pose", pose_bytes(full(people=2))))
     assert recording.performers.tolist() == [0, 1] * FRAMES

@@ -529,6 +529,13 @@ def test_positions_that_are_no_places_are_refused(tmp_path: Path, bad: float) ->
     assert "vertex 2" in refusal(scene, tmp_path)
 
 
+def test_a_signalling_nan_is_refused_and_not_warned_of(tmp_path: Path) -> None:
+    scene = Scene()
+    scene.node(mesh=scene.mesh())
+    scene.data = bytes.fromhex("0000817f") + scene.data[4:]
+    assert "vertex 0" in refusal(scene, tmp_path)
+
+
 def test_indices_beyond_the_vertices_are_refused(tmp_path: Path) -> None:
     scene = Scene()
     scene.node(mesh=scene.mesh(indices=scene.accessor([0, 1, 3], "uint32")))

@@ -18,6 +18,7 @@ from runtime.characters.palette import linear_from_srgb, palette_color
 from runtime.characters.weld import first_occurrences, weld, welded_weights
 
 TETRAHEDRON = np.array([[0.0, 0, 0], [2, 0, 0], [0, 3, 0], [0, 0, 1.5]])
+SIGNALLING_NAN = bytes.fromhex("0000817f")  # a float32
 FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 
 
@@ -144,6 +145,16 @@ def test_damaged_files_give_a_mesh_or_an_input_error(
     else:
         assert np.isfinite(mesh.vertices).all()
         assert 0 <= mesh.faces.min() <= mesh.faces.max() < len(mesh.vertices)
+
+
+@pytest.mark.parametrize("name", ["b.ply", "b.stl"])
+def test_a_signalling_nan_is_refused_and_not_warned_of(name: str, tmp_path: Path) -> None:
+    whole = FILES[name]
+    assert isinstance(whole, bytes)
+    corner = struct.pack("<3f", *TETRAHEDRON[1])
+    damaged = whole.replace(corner, SIGNALLING_NAN + corner[4:])
+    assert damaged != whole
+    assert "not a finite number" in str(mesh_or_refusal(written(tmp_path, name, damaged)))
 
 
 @pytest.mark.parametrize(
