@@ -27,7 +27,7 @@ from solvers.abstraction import find_root
 from solvers.tree import Tree
 from solvers.voxel_solid import surface_samples, voxel_solid
 
-VERSION = 3
+VERSION = 4
 """Changes whenever the same surface would give another skeleton; part of the key of a cache."""
 
 MOST_NODES = 200
@@ -470,12 +470,15 @@ def _evenly(polyline: FloatArray, bones: int) -> FloatArray:
 
 
 def _principal_axis(points: FloatArray) -> _Graph:
-    """A straight chain along the longest axis of a lump that has no limbs."""
+    """A straight chain along the longest axis of a lump that has no limbs, within its box."""
     axis = _axes(points)[0]
     axis = axis * np.sign(axis[np.argmax(np.abs(axis))])
-    along = (points - points.mean(axis=0)) @ axis
-    at = np.linspace(along.min(), along.max(), _STRAIGHT_BONES + 1)
-    positions = points.mean(axis=0) + at[:, None] * axis
+    middle = points.mean(axis=0)
+    along = (points - middle) @ axis
+    box = np.stack([points.min(axis=0), points.max(axis=0)]) - middle
+    walls = np.sort(box[:, axis != 0.0] / axis[axis != 0.0], axis=0)
+    first, last = max(along.min(), walls[0].max()), min(along.max(), walls[1].min())
+    positions = middle + np.linspace(first, last, _STRAIGHT_BONES + 1)[:, None] * axis
     edges = np.stack([np.arange(_STRAIGHT_BONES), np.arange(1, _STRAIGHT_BONES + 1)], axis=1)
     return _Graph(positions, edges.astype(np.int64))
 
