@@ -13,7 +13,7 @@ def uncollected() -> Iterator[None]:
 
     For what is loaded and built before a show: nearly all of it stays, and the collector would look
     through it again and again, a tenth of the time that it takes. What refers to itself and is
-    dropped there is collected afterwards.
+    dropped there is collected afterwards, or with what is `long_lived`.
     """
     was_on = gc.isenabled()
     gc.disable()

@@ -114,7 +114,7 @@ def _lay_out(vertices: Floats, edges: WeightedEdges, terms: Terms, *, sharing: i
     order = np.argsort(keys, kind="stable")
     place = np.empty_like(order)
     place[order] = np.arange(len(order))
-    twins = place[(order + len(i)) % max(len(order), 1)]  # i -> j lies so far from j -> i in keys
+    twins = np.roll(place, len(i))[order]  # among the keys j -> i lies half a turn from i -> j
     keys = keys[order]
     cells, neighbours = keys // count, keys % count
 

@@ -142,9 +142,9 @@ def _ring(offsets: Array, tangent: Array) -> Indices:
 
 def _one_rings(count: int, faces: Indices) -> csr_array:
     """(N, N): each row has entries at those vertices that share a triangle with its own."""
-    tails = np.concatenate([faces, np.roll(faces, 1, axis=1)]).ravel()
-    heads = np.concatenate([np.roll(faces, 1, axis=1), faces]).ravel()
-    return csr_array((np.ones(len(tails)), (tails, heads)), shape=(count, count))
+    tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    rows, columns = np.append(tails, heads), np.append(heads, tails)
+    return csr_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
 
 
 def _spread(points: Array, wanted: int) -> Indices:

@@ -20,7 +20,7 @@ MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off", ".mesh")
 MOST_BYTES = 1 << 30
 
 
-@np.errstate(over="ignore", invalid="ignore")  # what is no number is refused by what it is
+@np.errstate(over="ignore", invalid="ignore")  # whatever a damaged file holds
 def read_mesh_file(path: Path) -> FileMesh:
     """Read a file of `MESH_SUFFIXES`; all its objects are one mesh.
 

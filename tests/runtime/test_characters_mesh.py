@@ -18,8 +18,8 @@ from runtime.characters.palette import linear_from_srgb, palette_color
 from runtime.characters.weld import first_occurrences, weld, welded_weights
 
 TETRAHEDRON = np.array([[0.0, 0, 0], [2, 0, 0], [0, 3, 0], [0, 0, 1.5]])
-SIGNALLING_NAN = bytes.fromhex("0000817f")  # a float32
 FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
+SIGNALLING_NAN = bytes.fromhex("0000817f")  # a float32, which NumPy warns of
 
 
 @pytest.fixture(autouse=True)
