@@ -8,8 +8,9 @@ from collections.abc import Iterable
 from statistics import median
 
 HALF = 0.5  # of a period without anything ends a frame
-UNKNOWN_GAP = 0.004  # [s] that ends one while the period is not known
-LONGEST_GAP = 0.25  # [s]
+# [s] that end one at least and at most. What waited in a queue comes faster than it was sent, and
+# says nothing of the period; senders of more than 125 Hz are told by the parts that come again.
+SHORTEST_GAP, LONGEST_GAP = 0.004, 0.25
 FEWEST_PERIODS, KEPT_PERIODS = 2, 9
 REMEMBERED_FRAMES = 30  # a part that none of these had is not waited for
 
@@ -35,13 +36,13 @@ class FrameAssembly:
         self._last_in: dict[int, int] = {}
         self._previous: float | None = None
         self._periods: deque[float] = deque(maxlen=KEPT_PERIODS)
-        self._gap = UNKNOWN_GAP
+        self._gap = SHORTEST_GAP
 
     @property
     def gap(self) -> float:
         """The time [s] between two messages by which they are of different frames."""
         if math.isnan(self._gap):
-            self._gap = min(HALF * median(self._periods), LONGEST_GAP)
+            self._gap = min(max(HALF * median(self._periods), SHORTEST_GAP), LONGEST_GAP)
         return self._gap
 
     def add(self, part: int, arrival: float) -> None:
@@ -74,7 +75,7 @@ class FrameAssembly:
         if self._previous is not None:
             self._periods.append(self._began - self._previous)
             known = len(self._periods) >= FEWEST_PERIODS
-            self._gap = math.nan if known else UNKNOWN_GAP  # found when it is asked for
+            self._gap = math.nan if known else SHORTEST_GAP  # found when it is asked for
         self._previous = self._began
         self.parts = set()
 
@@ -86,5 +87,5 @@ class FrameAssembly:
         """Another sender may follow: expect nothing of it."""
         self._last_in.clear()
         self._periods.clear()
-        self._gap = UNKNOWN_GAP
+        self._gap = SHORTEST_GAP
         self._previous = None

@@ -118,6 +118,25 @@ def test_joining_in_the_middle_of_a_frame_sets_itself_right() -> None:
         assert frame.positions == pytest.approx(expected(waving(k)), abs=1e-6)
 
 
+@pytest.mark.parametrize("before", [0, 20], ids=["at the start", "in the midst"])
+def test_frames_that_waited_in_a_queue_tear_none_after_them(before: int) -> None:
+    decoder = VmcDecoder()
+    frames: list[SkeletonFrame] = []
+    now = 50.0
+    for k in range(before + 40):
+        waited = before <= k < before + 12
+        now += 0.0 if waited else STEP
+        for part in (slice(0, 20), slice(20, 40), slice(40, 55)):
+            said = bones(waving(k))[part] + (
+                [ok(1, 3, 0, 1), at(k * STEP)] if part.start == 40 else []
+            )
+            frames += decoder.feed(bundle(said), now)
+            now += 3e-5 if waited else 2e-4
+    assert len(frames) == before + 40
+    for k, frame in enumerate(frames):
+        assert frame.positions == pytest.approx(expected(waving(k)), abs=1e-6)
+
+
 def test_a_lost_datagram_leaves_its_bones_as_they_were_and_no_later_frame_torn() -> None:
     decoder = VmcDecoder()
     frames: list[SkeletonFrame] = []
