@@ -38,17 +38,17 @@ class SkeletonStream(Protocol):
 
 
 ADAPTERS = {
-    "sim": "devices.simulator",
-    "vmc": "devices.vmc",
-    "vrchat": "devices.vrchat",
-    "nimate": "devices.nimate",
-    "rokoko": "devices.rokoko",
-    "xsens": "devices.xsens",
-    "kinect": "devices.kinect",
-    "leap": "devices.leapc",
-    "leap+ws": "devices.leap_websocket",
-    "mediapipe": "devices.mediapipe_stream",
-    "zmq+tcp": "devices.bridge_stream",
+    "sim": "devices.builtin.simulator",
+    "vmc": "devices.osc.vmc",
+    "vrchat": "devices.osc.vrchat",
+    "nimate": "devices.osc.nimate",
+    "rokoko": "devices.studio.rokoko",
+    "xsens": "devices.studio.xsens",
+    "kinect": "devices.kinect.stream",
+    "leap": "devices.leap.leapc",
+    "leap+ws": "devices.leap.websocket",
+    "mediapipe": "devices.mediapipe.stream",
+    "zmq+tcp": "devices.bridge.stream",
 }
 """The module of each kind of address. It has `open_device(address: SplitResult)`, and is imported
 only when such an address is opened, so that an SDK that is not there troubles nobody else."""

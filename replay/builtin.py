@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from devices.acts import performance
+from devices.builtin.motions import performance
 from replay.recording import Recording
 
 

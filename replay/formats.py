@@ -7,23 +7,23 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from devices.errors import InputError
-from replay.bvh import read_bvh, recognises_bvh
+from replay.bvh.reader import read_bvh, recognises_bvh
 from replay.joint_table import read_joint_table, recognises_joint_table
-from replay.kinect_azure_csv import read_azure_csv, recognises_azure_csv
-from replay.kinect_laban import read_laban, recognises_laban
-from replay.kinect_msr import read_msr, recognises_msr
-from replay.kinect_ntu import read_ntu, recognises_ntu
-from replay.kinect_ut import read_ut, recognises_ut
-from replay.leap_files import read_leap, recognises_leap
-from replay.mcap_file import read_mcap, recognises_mcap
-from replay.mediapipe_files import read_mediapipe, recognises_mediapipe
+from replay.kinect.azure_csv import read_azure_csv, recognises_azure_csv
+from replay.kinect.laban import read_laban, recognises_laban
+from replay.kinect.msr import read_msr, recognises_msr
+from replay.kinect.ntu import read_ntu, recognises_ntu
+from replay.kinect.ut import read_ut, recognises_ut
+from replay.leap.files import read_leap, recognises_leap
+from replay.mcap.file import read_mcap, recognises_mcap
+from replay.mediapipe.files import read_mediapipe, recognises_mediapipe
 from replay.recording import Recording
 
 HEAD_BYTES = 4096
 
 
 @dataclass(frozen=True, slots=True)
-class Format:
+class RecordingFormat:
     """One kind of recorded file.
 
     Attributes:
@@ -37,23 +37,23 @@ class Format:
     read: Callable[[Path], Recording]
 
 
-def formats() -> tuple[Format, ...]:
+def formats() -> tuple[RecordingFormat, ...]:
     """Every kind of recording that can be opened, the most certain to recognise first."""
     return (
-        Format("Bunraku recording (MCAP)", recognises_mcap, read_mcap),
-        Format("Bunraku table (CSV)", recognises_joint_table, read_joint_table),
-        Format("Leap Motion messages", recognises_leap, read_leap),
-        Format("MediaPipe landmarks", recognises_mediapipe, read_mediapipe),
-        Format("Azure Kinect joints (CSV)", recognises_azure_csv, read_azure_csv),
-        Format("Kinect v2, Labanotation Suite (CSV)", recognises_laban, read_laban),
-        Format("Kinect v2, NTU RGB+D (.skeleton)", recognises_ntu, read_ntu),
-        Format("Kinect v1, UTKinect-Action3D", recognises_ut, read_ut),
-        Format("Kinect v1, MSR Action3D", recognises_msr, read_msr),
-        Format("BVH", recognises_bvh, read_bvh),
+        RecordingFormat("Bunraku recording (MCAP)", recognises_mcap, read_mcap),
+        RecordingFormat("Bunraku table (CSV)", recognises_joint_table, read_joint_table),
+        RecordingFormat("Leap Motion messages", recognises_leap, read_leap),
+        RecordingFormat("MediaPipe landmarks", recognises_mediapipe, read_mediapipe),
+        RecordingFormat("Azure Kinect joints (CSV)", recognises_azure_csv, read_azure_csv),
+        RecordingFormat("Kinect v2, Labanotation Suite (CSV)", recognises_laban, read_laban),
+        RecordingFormat("Kinect v2, NTU RGB+D (.skeleton)", recognises_ntu, read_ntu),
+        RecordingFormat("Kinect v1, UTKinect-Action3D", recognises_ut, read_ut),
+        RecordingFormat("Kinect v1, MSR Action3D", recognises_msr, read_msr),
+        RecordingFormat("BVH", recognises_bvh, read_bvh),
     )
 
 
-def recognise(path: Path) -> Format:
+def recognise(path: Path) -> RecordingFormat:
     """The format of the file at `path`.
 
     Raises:

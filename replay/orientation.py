@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.anatomy import Kind, Part, Side, first_of, heading_joints
+from devices.bodies.anatomy import BodyPart, Kind, Side, first_of, heading_joints
 from devices.skeleton import Skeleton
 
 Array = NDArray[np.float64]
@@ -23,7 +23,7 @@ _LEG_AND_SPINE = 0.87  # of a body's height: hip to ankle and pelvis to head, al
 
 
 def up_axis(
-    skeleton: Skeleton, parts: Sequence[Part | None], positions: Array, rest: Array
+    skeleton: Skeleton, parts: Sequence[BodyPart | None], positions: Array, rest: Array
 ) -> Array | None:
     """The axis (3,) of the recording's own frame along which the body stands, a unit vector.
 
@@ -54,7 +54,7 @@ def up_axis(
 
 
 def stands_upright(
-    skeleton: Skeleton, parts: Sequence[Part | None], positions: Array, up: Array
+    skeleton: Skeleton, parts: Sequence[BodyPart | None], positions: Array, up: Array
 ) -> bool:
     """Whether the head is above the hips, within 60 degrees, in most frames: a biped's body."""
     spine = _between(
@@ -67,7 +67,7 @@ def stands_upright(
     return bool(rise.size and np.median(rise) > 0.5)
 
 
-def legs_hang(skeleton: Skeleton, parts: Sequence[Part | None], pose: Array, up: Array) -> bool:
+def legs_hang(skeleton: Skeleton, parts: Sequence[BodyPart | None], pose: Array, up: Array) -> bool:
     """Whether the legs of a pose (J, 3) that has any hang within 60 degrees."""
     for side in _SIDES:
         hip, foot = (_place(skeleton, parts, kind, side) for kind in (Kind.UPPER_LEG, Kind.FOOT))
@@ -78,7 +78,7 @@ def legs_hang(skeleton: Skeleton, parts: Sequence[Part | None], pose: Array, up:
 
 
 def standing_axis(
-    skeleton: Skeleton, parts: Sequence[Part | None], positions: Array
+    skeleton: Skeleton, parts: Sequence[BodyPart | None], positions: Array
 ) -> Array | None:
     """The direction (3,) in which the body stands, feet to head, in frames where it is straight.
 
@@ -107,7 +107,7 @@ def standing_axis(
     return axis / np.linalg.norm(axis) if axis.any() else None
 
 
-def body_height(skeleton: Skeleton, parts: Sequence[Part | None], rest: Array) -> float | None:
+def body_height(skeleton: Skeleton, parts: Sequence[BodyPart | None], rest: Array) -> float | None:
     """How tall a person with these bones is, from the lengths of leg and spine; pose-free.
 
     Returns:
@@ -194,12 +194,12 @@ def _sampled(positions: Array) -> Array:
 
 
 def _place(
-    skeleton: Skeleton, parts: Sequence[Part | None], kind: Kind, side: Side = Side.CENTRE
+    skeleton: Skeleton, parts: Sequence[BodyPart | None], kind: Kind, side: Side = Side.CENTRE
 ) -> int | None:
     return first_of(parts, skeleton, kind, side)
 
 
-def _head(skeleton: Skeleton, parts: Sequence[Part | None]) -> int | None:
+def _head(skeleton: Skeleton, parts: Sequence[BodyPart | None]) -> int | None:
     head = _place(skeleton, parts, Kind.HEAD)
     return _place(skeleton, parts, Kind.NECK) if head is None else head
 
@@ -208,7 +208,7 @@ def _between(start: int | None, end: int | None, frames: Array) -> Array | None:
     return None if start is None or end is None else frames[:, end] - frames[:, start]
 
 
-def _rising(skeleton: Skeleton, parts: Sequence[Part | None], frames: Array) -> Array | None:
+def _rising(skeleton: Skeleton, parts: Sequence[BodyPart | None], frames: Array) -> Array | None:
     """In each frame (T, 3) the sum of what points up along a standing body."""
     vectors = []
     for side in _SIDES:

@@ -21,7 +21,7 @@ from replay.recording import Recording
 LONE_FRAME_SECONDS = 1.0 / 30.0
 
 
-class Pace(Protocol):
+class FrameTiming(Protocol):
     """How fast a player's timeline goes by."""
 
     @property
@@ -94,7 +94,7 @@ class Player:
         loop: start again from the front after the last frame, one median frame time later.
     """
 
-    def __init__(self, recording: Recording, pace: Pace, *, loop: bool = False) -> None:
+    def __init__(self, recording: Recording, pace: FrameTiming, *, loop: bool = False) -> None:
         self.recording = recording
         self.loop = loop
         self._pace = pace

@@ -10,7 +10,7 @@ from typing import Self
 
 from devices.errors import InputError
 from devices.skeleton import Skeleton, SkeletonFrame
-from replay.mcap_writer import SYNC_SECONDS, McapWriter
+from replay.mcap.writer import SYNC_SECONDS, McapWriter
 
 WAITING = 16_384
 """Frames that wait for the disk at most, about 80 MB of 59 joints: a minute of four performers at

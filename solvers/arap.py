@@ -3,13 +3,13 @@
 Sorkine and Alexa 2007, As-rigid-as-possible surface modeling; Chao et al. 2010, A simple geometric
 model for elastic deformations, for the energy with rims. Four things are added.
 
-- The start. The last answer first moves along with the handles (`solvers.handle_motion`), so that a
-  rigid motion of all handles is the answer at once. After a jump the rest pose, moved along, is
-  taken instead if it is nearer to rigid: a bad frame leaves nothing behind.
+- The start. The last answer first moves along with the handles (`solvers.deform.handle_motion`),
+  so that a rigid motion of all handles is the answer at once. After a jump the rest pose, moved
+  along, is taken instead if it is nearer to rigid: a bad frame leaves nothing behind.
 - The unknown. The global step solves for the correction of the positions, from a residual in double
   precision, so the error of the solve is relative to the correction, not to the character.
 - Rotations that know of each other, where asked for: smooth ones for few handles, and limbs that
-  stay stiff (`solvers.rotation_priors`).
+  stay stiff (`solvers.deform.rotation_priors`).
 - The parts that no handle touches. A component without a handle is nobody's to bend: it is carried
   rigidly by the nearest group of handles, and so is a vertex without a face.
 """
@@ -22,23 +22,29 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solvers.arap_cells import SPOKES, SPOKES_AND_RIMS, build_cells
-from solvers.arap_kernels import energy_terms, fit_cells, place_outside, pull_soft, residual
-from solvers.arap_layout import Frame, checked_integers, checked_mesh, checked_targets, lay_out
-from solvers.compiled import most_threads, threads_for
-from solvers.creases import Creases
-from solvers.following import Following
-from solvers.handle_motion import farthest_motion, fit_motions, follow, follow_one_group
-from solvers.handles import checked_handles, nearest_groups, unheld
-from solvers.held_system import HeldSystem, Hold
-from solvers.laplacian import Floats, Ints
-from solvers.rotation_fit import SCRATCH
-from solvers.rotation_priors import (
+from solvers.deform.arap_cells import SPOKES, SPOKES_AND_RIMS, build_cells
+from solvers.deform.arap_kernels import energy_terms, fit_cells, place_outside, pull_soft, residual
+from solvers.deform.arap_layout import (
+    Frame,
+    checked_integers,
+    checked_mesh,
+    checked_targets,
+    lay_out,
+)
+from solvers.deform.creases import Creases
+from solvers.deform.handle_influence import Following
+from solvers.deform.handle_motion import farthest_motion, fit_motions, follow, follow_one_group
+from solvers.deform.handles import checked_handles, nearest_groups, unheld
+from solvers.deform.rotation_fit import SCRATCH
+from solvers.deform.rotation_priors import (
     SMOOTHNESS,
     RotationPriors,
     fit_cells_near,
     turn_along,
 )
+from solvers.kernels.compiled import most_threads, threads_for
+from solvers.linear.constrained_system import ConstrainedSystem, Hold
+from solvers.linear.laplacian import Floats, Ints
 
 SMOOTH_ROTATIONS = "smooth-rotations"
 ENERGIES = (SPOKES, SPOKES_AND_RIMS, SMOOTH_ROTATIONS)
@@ -99,7 +105,7 @@ class ArapSolver:
         self._mesh = build_cells(self._rest, layout.faces, energy)
         self._unit = float(self._mesh.laplacian.diagonal().mean()) or 1.0
         self._carry()
-        self._system = HeldSystem(self._mesh.laplacian, layout.tree, self._held())
+        self._system = ConstrainedSystem(self._mesh.laplacian, layout.tree, self._held())
         self._following = Following(self._system, self._handles)
         count = len(points)
         smoothing = SMOOTHNESS * _area(self._rest, layout.faces)
@@ -161,7 +167,7 @@ class ArapSolver:
         Args:
             region_of: (N,) integers, which part each vertex belongs to.
             rigidity: (N,) in [0, 1], how much of the stiffness each takes: 1 within a limb, falling
-                to 0 where it may bend; see `solvers.articulation`.
+                to 0 where it may bend; see `solvers.deform.stiff_segments`.
 
         Raises:
             ValueError: for wrong shapes or a rigidity out of range; nothing changes then.
@@ -247,7 +253,7 @@ class ArapSolver:
     def iron(self, answer: Floats) -> int:
         """Lay flat what is folded in the answer (N, 3) that the last solve gave, in place.
 
-        What goes on to the next frame is left as it is: see `solvers.creases`.
+        What goes on to the next frame is left as it is: see `solvers.deform.creases`.
 
         Returns:
             How many triangles were folded.

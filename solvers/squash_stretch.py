@@ -27,9 +27,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from solvers.arap import ArapSolver
-from solvers.arap_cells import SPOKES
-from solvers.laplacian import Floats, Ints, weighted_sums
-from solvers.squash_kernels import (
+from solvers.deform.arap_cells import SPOKES
+from solvers.deform.closed_shells import build_shell
+from solvers.deform.squash_kernels import (
     Fit,
     Planes,
     add_scaled,
@@ -44,7 +44,7 @@ from solvers.squash_kernels import (
     sum_parts,
     volume_terms,
 )
-from solvers.squash_shell import build_shell
+from solvers.linear.laplacian import Floats, Ints, weighted_sums
 
 # The least extent of a cell along its second axis, as a share of the first: a ring that is nearly a
 # line has no stretch across it to speak of.

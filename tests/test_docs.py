@@ -13,15 +13,15 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from devices.acts import ACTS
-from devices.anatomy import PRESETS
+from devices.bodies.anatomy import PRESETS
+from devices.builtin.motions import ACTS
 from replay.formats import formats
-from runtime.actions import ACTIONS
 from runtime.characters.builtin import BUILTIN
-from runtime.characters.load import SUFFIXES
+from runtime.characters.character_file import SUFFIXES
 from runtime.cli import main, parser
-from runtime.controls import KEYS
-from runtime.output.report import Report
+from runtime.control.actions import ACTIONS
+from runtime.control.keys import KEYS
+from runtime.output.report.report import Report
 
 CHECKOUT = Path(__file__).resolve().parents[1]
 PAGES = sorted([*CHECKOUT.glob("*.md"), *(CHECKOUT / "docs").glob("*.md")])

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from runtime.benchmarks.torus import pulled_patch, torus
 from solvers.arap import ArapSolver
-from solvers.arap_cells import SPOKES, build_cells
-from solvers.arap_kernels import fit_cells, residual
-from solvers.arap_layout import lay_out
-from solvers.compiled import most_threads, parallel_kernel, threads_for
-from solvers.held_system import HeldSystem, Hold
-from solvers.rotation_fit import SCRATCH
+from solvers.deform.arap_cells import SPOKES, build_cells
+from solvers.deform.arap_kernels import fit_cells, residual
+from solvers.deform.arap_layout import lay_out
+from solvers.deform.rotation_fit import SCRATCH
+from solvers.kernels.compiled import most_threads, parallel_kernel, threads_for
+from solvers.linear.constrained_system import ConstrainedSystem, Hold
 
 SIZES = (2_500, 10_000, 40_000, 160_000)
 REPEATS = 9
@@ -100,7 +100,7 @@ def _stages(
     mesh = build_cells(x, layout.faces, SPOKES)
     held = Hold(np.zeros(len(x), dtype=np.bool_), np.zeros(len(x)))
     held.fixed[layout.place[handles]] = True
-    system = HeldSystem(mesh.laplacian, layout.tree, held)
+    system = ConstrainedSystem(mesh.laplacian, layout.tree, held)
     R, laplace_x, b = np.empty((len(x), 9)), np.empty_like(x), np.zeros_like(x)
     room = np.empty((most_threads(), SCRATCH))
     arrays = mesh.cells.fits, mesh.cells.pulls, mesh.cells.own

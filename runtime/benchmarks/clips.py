@@ -2,7 +2,8 @@
 
 Every clip drives every character, as `bunraku replay --fast` would without a picture. For each clip
 the worst of its characters is told: tick times, edge stretch at the 99th percentile over all
-frames, and triangles that are inverted at the end or were so for long (`runtime.output.watchdog`).
+frames, and triangles that are inverted at the end or were so for long
+(`runtime.output.report.watchdog`).
 """
 
 from __future__ import annotations
@@ -12,22 +13,22 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from devices.acts import ACTS
+from devices.builtin.motions import ACTS
 from replay.builtin import builtin_recording
 from replay.formats import read_recording
 from replay.player import EveryFrame, Player
 from replay.recording import Recording
-from runtime.cast import character_named
-from runtime.character import Character
 from runtime.characters.builtin import BUILTIN
+from runtime.characters.character import Character
+from runtime.characters.open_character import load_character
 from runtime.conditioning.switches import for_recording
-from runtime.director import Choices, Director
-from runtime.loop import FrameLoop
-from runtime.output.report import Report
-from runtime.performer import Performer
-from runtime.puppet import Puppet
-from runtime.rehearsal import rehearse
+from runtime.driving.match_session import Choices, MatchSession
+from runtime.driving.performer import Performer
+from runtime.driving.rehearsal import rehearse
+from runtime.output.report.report import Report
+from runtime.puppet.puppet import Puppet
 from runtime.render.camera import front_camera
+from runtime.show.loop import FrameLoop
 
 FRAME_MS = 16.0  # that no tick may take
 
@@ -43,7 +44,7 @@ def run(
     """
     clips = [(path.name, read_recording(path)) for path in recording or ()]
     clips = clips or [(act, builtin_recording(act)) for act in ACTS]
-    cast = [(name, character_named(name)) for name in character or BUILTIN]
+    cast = [(name, load_character(name)) for name in character or BUILTIN]
     print(f"clips: worst of {len(cast)} characters; no tick may take {FRAME_MS:g} ms")
     print(
         f"{'clip':<34} {'frames':>6} {'tick p50':>8} {'p99':>6} {'max':>6} {'over':>5}"
@@ -68,8 +69,10 @@ def _perform(recording: Recording, character: Character) -> dict[str, Any]:
     performer = Performer(recording.skeleton, conditioning=conditioning)
     puppet = Puppet(character)
     camera = front_camera()
-    director = Director(performer, [puppet], lambda: camera.view_rotation, Choices(), [None])
-    rehearse(recording, "whole", director, conditioning)
+    match_session = MatchSession(
+        performer, [puppet], lambda: camera.view_rotation, Choices(), [None]
+    )
+    rehearse(recording, "whole", match_session, conditioning)
     report = Report(None)
     player = Player(recording, EveryFrame())
     part = report.cast(character)
@@ -77,9 +80,9 @@ def _perform(recording: Recording, character: Character) -> dict[str, Any]:
         player,
         performer,
         [puppet],
-        director=director,
+        match_session=match_session,
         report=report,
-        theatre=None,
+        scene=None,
         outputs=[[part]],
         conditioning=conditioning,
     )

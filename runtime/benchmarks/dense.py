@@ -18,17 +18,17 @@ from numpy.typing import NDArray
 
 from replay.builtin import builtin_recording
 from replay.recording import Recording
-from runtime.character import Character
 from runtime.characters.builtin import builtin_character
+from runtime.characters.character import Character
 from runtime.characters.proxy import DENSE, PROXY, Proxy, proxy_of
-from runtime.director import Choices, Director
-from runtime.performer import Performer
-from runtime.puppet import Puppet
-from runtime.rehearsal import rehearse
+from runtime.driving.match_session import Choices, MatchSession
+from runtime.driving.performer import Performer
+from runtime.driving.rehearsal import rehearse
+from runtime.puppet.puppet import Puppet
 from runtime.render.camera import front_camera
 from solvers.arap import ArapSolver
-from solvers.decimation import decimate
-from solvers.edges import Edges
+from solvers.surface.decimation import decimate
+from solvers.surface.edges import Edges
 
 SIZES = (10_000, 20_000, 40_000, 100_000, 160_000, 300_000)
 FRAMES = 100
@@ -157,8 +157,10 @@ def _perform(character: Character, proxy: Proxy, recording: Recording, frames: i
     coarse = replace(character, vertices=proxy.vertices, faces=proxy.faces, weights=weights)
     puppet = Puppet(coarse)
     performer, camera = Performer(recording.skeleton), front_camera()
-    director = Director(performer, [puppet], lambda: camera.view_rotation, Choices(), [None])
-    rehearse(recording, "whole", director)
+    match_session = MatchSession(
+        performer, [puppet], lambda: camera.view_rotation, Choices(), [None]
+    )
+    rehearse(recording, "whole", match_session)
     binding = puppet.binding
     targets = []
     for index in range(0, len(recording), STEP)[:frames]:

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from runtime.cast import character_named
 from runtime.characters.builtin import BUILTIN
-from runtime.puppet import Puppet
+from runtime.characters.open_character import load_character
+from runtime.puppet.puppet import Puppet
 from solvers.arap import ArapSolver
 
 FRAME = 16.0  # [ms] that a change may cost, its frame's own iterations included
@@ -44,7 +44,7 @@ def run() -> dict[str, object]:
 
 
 def _measure(name: str) -> dict[str, Any]:
-    character = character_named(name)
+    character = load_character(name)
     binding = Puppet(character).binding
     handles, anchors = binding.handles, binding.anchor
     rest = character.vertices

@@ -14,14 +14,14 @@ from pathlib import Path
 
 import numpy as np
 
-from devices.acts import performance
-from devices.simulator import Simulator
+from devices.builtin.motions import performance
+from devices.builtin.simulator import Simulator
 from devices.skeleton import SkeletonFrame
-from replay.mcap_file import McapReader
+from replay.mcap.file import McapReader
 from replay.recorded_stream import RecordedStream
 from replay.recorder import Recorder
-from runtime.clock import Ticker
-from runtime.warn import warn
+from runtime.show.clock import Ticker
+from runtime.show.warn import warn
 
 MOMENTS = 50
 PERFORMERS = 4

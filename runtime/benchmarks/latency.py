@@ -14,25 +14,25 @@ from urllib.parse import urlsplit
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.bridge_stream import BridgeStream
-from devices.bridge_stream import open_device as open_bridge
+from devices.bridge.stream import BridgeStream
+from devices.bridge.stream import open_device as open_bridge
 from devices.errors import InputError
-from devices.live_stream import LiveStream
+from devices.osc.vmc import VmcDecoder
 from devices.skeleton import Skeleton, SkeletonFrame
-from devices.udp import UdpTransport
-from devices.vmc import VmcDecoder
+from devices.transport.live_stream import LiveStream
+from devices.transport.udp import UdpTransport
 from runtime.characters.builtin import builtin_character
 from runtime.conditioning.switches import for_live
-from runtime.director import Choices, Director
-from runtime.interrupt import held
-from runtime.loop import FrameLoop
-from runtime.output.report import Report
-from runtime.pacing import OnArrival, SpareTime
-from runtime.pauses import long_lived
-from runtime.performer import Performer, Pose
-from runtime.puppet import Motion, Puppet
+from runtime.driving.match_session import Choices, MatchSession
+from runtime.driving.performer import Performer, Pose
+from runtime.output.report.report import Report
+from runtime.puppet.puppet import Motion, Puppet
 from runtime.render.context import headless_context, is_software, release_headless
-from runtime.theatre import Theatre
+from runtime.show.collector_pauses import objects_frozen
+from runtime.show.interrupt import held
+from runtime.show.loop import FrameLoop
+from runtime.show.pacing import OnArrival, SpareTime
+from runtime.show.scene import Scene
 
 RATES = (30.0, 60.0, 120.0)
 WAYS = ("zmq", "vmc")
@@ -119,8 +119,8 @@ def measured(
             stream = closing.enter_context(LiveStream(udp, VmcDecoder))
             sender = closing.enter_context(_sender(way, rate, count, str(udp.port)))
         show = _Show(context, _Noted(stream), drawn=drawn)
-        closing.callback(show.theatre.close)
-        closing.enter_context(long_lived())
+        closing.callback(show.scene.close)
+        closing.enter_context(objects_frozen())
         _say(sender, "go")
         show.perform(count)
     return show.times(count, skipped=round(rate * WARM_UP))
@@ -158,7 +158,7 @@ class _Noted:
         self.close()
 
 
-class _Stamping(Theatre):
+class _Stamping(Scene):
     """A theatre that says when [s] the GPU had the vertices, and when the picture was there."""
 
     context: Context
@@ -185,17 +185,17 @@ class _Show:
         self._rows: list[tuple[float, ...]] = []
         performer = Performer(stream.skeleton, "whole", for_live())
         puppet = Puppet(builtin_character(CHARACTER))
-        self.theatre = _Stamping(context, SIZE, [puppet], stream.skeleton)
-        self.theatre.context, self.theatre.draws = context, drawn
-        view = self.theatre.camera.view_rotation
+        self.scene = _Stamping(context, SIZE, [puppet], stream.skeleton)
+        self.scene.context, self.scene.draws = context, drawn
+        view = self.scene.camera.view_rotation
         report = Report(None)
         self._loop = FrameLoop(
             stream,
             performer,
             [puppet],
-            director=Director(performer, [puppet], lambda: view, Choices(), [None]),
+            match_session=MatchSession(performer, [puppet], lambda: view, Choices(), [None]),
             report=report,
-            theatre=self.theatre,
+            scene=self.scene,
             outputs=[[report.cast(puppet.character)]],
             conditioning=for_live(),
             shown=True,
@@ -203,7 +203,7 @@ class _Show:
 
     def perform(self, count: int) -> None:
         """Perform until so many frames have come, or none comes any more."""
-        stream, theatre = self._stream, self.theatre
+        stream, scene = self._stream, self.scene
         pace = OnArrival(stream.stream)
         spare = SpareTime(pace, self._loop)
         heard = time.perf_counter()
@@ -215,7 +215,7 @@ class _Show:
             if performed and stream.newest is not None:
                 heard = time.perf_counter()
                 newest = stream.newest
-                stamps = (newest.time, newest.arrival, theatre.uploaded, theatre.drawn)
+                stamps = (newest.time, newest.arrival, scene.uploaded, scene.drawn)
                 self._rows.append((stream.given, *stamps))
 
     def times(self, count: int, skipped: int) -> Times:

@@ -13,14 +13,14 @@ from contextlib import ExitStack
 
 import numpy as np
 
-from devices.acts import performance
-from devices.performance import RATE, Performance
+from devices.builtin.motions import performance
+from devices.builtin.performance import RATE, Performance
 from devices.skeleton import SkeletonFrame
-from runtime.clock import Ticker
-from runtime.output.bridge_publisher import BridgePublisher, binding
+from runtime.driving.performer import Performer
+from runtime.output.live.bridge_publisher import BridgePublisher, binding
+from runtime.output.live.vmc_performer import VmcPerformer
 from runtime.output.output import PerformedFrame
-from runtime.output.vmc_performer import VmcPerformer
-from runtime.performer import Performer
+from runtime.show.clock import Ticker
 
 ACT = "walk"
 _NOTHING = np.zeros((0, 3))

@@ -12,12 +12,12 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.abstraction import simplify
-from solvers.chain_retargets import ChainRetargets
 from solvers.matching import SIZE_PREFERENCE, Match, TargetHierarchy
-from solvers.polyline_motion import map_chain
-from solvers.skeleton_pose import SkeletonPose
-from solvers.tree import Tree
+from solvers.retarget.abstraction import simplify
+from solvers.retarget.chain_retargets import ChainRetargets
+from solvers.retarget.polyline_motion import map_chain
+from solvers.skeleton.forward_kinematics import SkeletonPose
+from solvers.skeleton.tree import Tree
 
 BUDGET_MS = 0.5
 FRAMES = 300

@@ -10,27 +10,27 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.acts import performance
-from devices.performance import RATE
-from devices.simulator import Simulator
+from devices.builtin.motions import performance
+from devices.builtin.performance import RATE
+from devices.builtin.simulator import Simulator
 from devices.skeleton import SkeletonFrame
-from replay.mcap_file import McapReader
+from replay.mcap.file import McapReader
 from replay.recorded_stream import Keep, RecordedStream
 from replay.recorder import WAITING, Recorder
 from runtime.benchmarks.memory import resident_memory
 from runtime.benchmarks.stolen_time import JIFFY, stolen_time
 from runtime.characters.builtin import builtin_character
-from runtime.clock import Ticker
 from runtime.conditioning.switches import for_live
-from runtime.director import Choices, Director
-from runtime.loop import FrameLoop
-from runtime.output.report import Report
-from runtime.pacing import AtOnce, SpareTime
-from runtime.pauses import long_lived
-from runtime.performer import Performer
-from runtime.puppet import Puppet
+from runtime.driving.match_session import Choices, MatchSession
+from runtime.driving.performer import Performer
+from runtime.output.report.report import Report
+from runtime.puppet.puppet import Puppet
 from runtime.render.camera import front_camera
-from runtime.warn import warn
+from runtime.show.clock import Ticker
+from runtime.show.collector_pauses import objects_frozen
+from runtime.show.loop import FrameLoop
+from runtime.show.pacing import AtOnce, SpareTime
+from runtime.show.warn import warn
 
 HOUR = 3600.0  # [s]
 PERFORMERS = 4
@@ -142,7 +142,7 @@ def soaked(path: Path, seconds: float, *, real_time: bool) -> Soak:
         loop = _loop(RecordedStream(stream, log.note))
         pace = Ticker(RATE) if real_time else AtOnce()
         spare = SpareTime(pace, loop)
-        with long_lived():
+        with objects_frozen():
             before = stolen_time()
             for tick in range(ticks):
                 began, worked = time.perf_counter(), time.thread_time()
@@ -169,9 +169,11 @@ def _loop(stream: RecordedStream) -> FrameLoop:
         stream,
         performer,
         [puppet],
-        director=Director(performer, [puppet], lambda: camera.view_rotation, Choices(), [None]),
+        match_session=MatchSession(
+            performer, [puppet], lambda: camera.view_rotation, Choices(), [None]
+        ),
         report=report,
-        theatre=None,
+        scene=None,
         outputs=[[report.cast(puppet.character)]],
         conditioning=for_live(),
     )

@@ -5,12 +5,12 @@ from __future__ import annotations
 from replay.builtin import builtin_recording
 from replay.player import EveryFrame, Player
 from runtime.characters.builtin import BUILTIN, builtin_character
-from runtime.director import Choices, Director
-from runtime.loop import FrameLoop
-from runtime.output.report import Report
-from runtime.performer import Performer
-from runtime.puppet import Puppet
+from runtime.driving.match_session import Choices, MatchSession
+from runtime.driving.performer import Performer
+from runtime.output.report.report import Report
+from runtime.puppet.puppet import Puppet
 from runtime.render.camera import front_camera
+from runtime.show.loop import FrameLoop
 
 BUDGET_MS = {"p50": 4.0, "p99": 8.0}
 ITERATIONS = (1, 2, 3)
@@ -46,7 +46,9 @@ def _replay(name: str, iterations: int) -> dict[str, dict[str, float]]:
     performer = Performer(recording.skeleton)
     puppet = Puppet(builtin_character(name), iterations=iterations)
     camera = front_camera()
-    director = Director(performer, [puppet], lambda: camera.view_rotation, Choices(), [None])
+    match_session = MatchSession(
+        performer, [puppet], lambda: camera.view_rotation, Choices(), [None]
+    )
     report = Report(None)
     for _ in range(2):
         report = Report(None)
@@ -55,9 +57,9 @@ def _replay(name: str, iterations: int) -> dict[str, dict[str, float]]:
             player,
             performer,
             [puppet],
-            director=director,
+            match_session=match_session,
             report=report,
-            theatre=None,
+            scene=None,
             outputs=[[report.cast(puppet.character)]],
         )
         while not player.ended:

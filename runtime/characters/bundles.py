@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, hstack
 
 from devices.skeleton import Skeleton
-from runtime.character import Character
+from runtime.characters.character import Character
 
 SIDE_BY_SIDE = np.cos(np.radians(20.0))  # of the angle between two bones of a bundle
 SHARED = 0.85  # of the shortest bone's length lies in the bundle

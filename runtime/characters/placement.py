@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from runtime.characters.upright import (
+from solvers.surface.upright import (
     X,
     Y,
     faces_away,

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from runtime.character import Character
-from solvers.decimation import decimate
-from solvers.embedding import MOST_VERTICES, DenseSurface, embed
+from runtime.characters.character import Character
+from solvers.surface.decimation import decimate
+from solvers.surface.embedding import MOST_VERTICES, DenseSurface, embed
 
 DENSE = 20_000  # vertices above which a proxy pays: docs/dense-characters.md, `bunraku bench dense`
 PROXY = 9_000  # vertices of one

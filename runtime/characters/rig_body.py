@@ -28,7 +28,7 @@ _MOST_SAMPLES = 2_000_000
 _FEWEST, _WANTED, _MOST = 3_000, 5_000, 8_000
 
 
-def body_of(skeleton: Skeleton) -> tuple[Array, Faces, csr_array]:
+def body_around(skeleton: Skeleton) -> tuple[Array, Faces, csr_array]:
     """A watertight body round the bones of a skeleton, which may be in any unit.
 
     Returns:

@@ -13,14 +13,14 @@ steps are taken in this order, because each may rely on those before it:
    they could enter a filter.
 5. **Filling** (`replay.fill`): unseen joints are held, then eased to rest. After this nothing is
    NaN; this step alone cannot be switched off.
-6. **Smoothing** (`solvers.one_euro`): the One-Euro filter, on whole poses.
-7. **Prediction** (`solvers.prediction`): one frame ahead, by smoothed velocities.
+6. **Smoothing** (`solvers.signal.one_euro`): the One-Euro filter, on whole poses.
+7. **Prediction** (`solvers.signal.prediction`): one frame ahead, by smoothed velocities.
 8. **Floor** (`levelling`), **size** (`stature`), **pose held** (`held_pose`), **mirror**: the
    space of the stage. They look at what was trusted, and what is before them works in the sensor's
    own space, so that these may be switched while the show runs and nothing has to be learned anew.
 
-Steps 1 and 2 look at every frame of the stream (`runtime.loop`); from 3 on the newest frame of who
-drives is enough (`conditioner`). The recorder is given what came, before all of this.
+Steps 1 and 2 look at every frame of the stream (`runtime.show.loop`); from 3 on the newest frame
+of who drives is enough (`conditioner`). The recorder is given what came, before all of this.
 
 `switches.Conditioning` says what is done. A live stream is given everything but prediction, mirror
 and calibration by pose. A recording is only mended (2 to 5): its reader has put it in order and

@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 
 from devices.skeleton import Skeleton, SkeletonFrame
 from replay.fill import Filler
-from runtime.conditioning.body import body_of
+from runtime.conditioning.body_anatomy import body_anatomy
+from runtime.conditioning.calibration_pose import CalibrationPose
 from runtime.conditioning.faults import Faults
-from runtime.conditioning.held_pose import HeldPose
 from runtime.conditioning.levelling import Levelling
 from runtime.conditioning.mirror import mirrored
 from runtime.conditioning.rejoining import Rejoining
 from runtime.conditioning.stature import Stature
 from runtime.conditioning.switches import SWITCHES, Conditioning
-from solvers.one_euro import OneEuroFilter
-from solvers.prediction import Predictor
+from solvers.signal.one_euro import OneEuroFilter
+from solvers.signal.prediction import Predictor
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -55,7 +55,7 @@ class _Memory:
     """What is remembered of one performer."""
 
     def __init__(
-        self, faults: Faults, rejoining: Rejoining, stature: Stature, held: HeldPose
+        self, faults: Faults, rejoining: Rejoining, stature: Stature, held: CalibrationPose
     ) -> None:
         self.faults = faults
         self.rejoining = rejoining
@@ -82,7 +82,7 @@ class Conditioner:
         self.switches = switches
         self.held = False
         self._skeleton = skeleton
-        self._body = body_of(skeleton)
+        self._body = body_anatomy(skeleton)
         self.levelling = Levelling(self._body)
         self._filler = Filler(skeleton)
         self._memories: dict[int, _Memory] = {}
@@ -138,7 +138,9 @@ class Conditioner:
         if memory is None:
             count = len(self._skeleton.names)
             faults, rejoining = Faults(self._body, count), Rejoining(count)
-            memory = _Memory(faults, rejoining, Stature(self._skeleton), HeldPose(self._skeleton))
+            memory = _Memory(
+                faults, rejoining, Stature(self._skeleton), CalibrationPose(self._skeleton)
+            )
             self._memories[performer] = memory
             if len(self._memories) > MOST_PERFORMERS:
                 del self._memories[next(iter(self._memories))]

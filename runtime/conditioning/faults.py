@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.fill import was_seen
-from runtime.conditioning.body import Body
-from solvers.compiled import kernel
-from solvers.continuity import LEAST_WRONG, distance, exchanged, expect
+from runtime.conditioning.body_anatomy import BodyAnatomy
+from solvers.kernels.compiled import kernel
+from solvers.signal.continuity import LEAST_WRONG, distance, exchanged, expect
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -93,7 +93,7 @@ class Faults:
         joints: how many the skeleton has.
     """
 
-    def __init__(self, body: Body, joints: int) -> None:
+    def __init__(self, body: BodyAnatomy, joints: int) -> None:
         self._joints = np.zeros(joints, _JOINT)
         self._joints["partner"], self._joints["limb"] = body.partner, body.group
         self._joints["place"] = self._joints["doubted"] = np.nan

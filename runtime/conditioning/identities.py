@@ -15,9 +15,9 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.anatomy import hips_joint
+from devices.bodies.anatomy import hips_joint
 from devices.skeleton import Skeleton, SkeletonFrame
-from solvers.association import associate
+from solvers.signal.association import associate
 
 Array = NDArray[np.float64]
 

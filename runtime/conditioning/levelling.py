@@ -1,7 +1,7 @@
 """The floor brought to y = 0, by where the feet have stood.
 
 Devices that see the floor themselves, or feel how they are tilted, have levelled their frames
-already (`devices.floor_level`); then there is little left to do here.
+already (`devices.bodies.floor_level`); then there is little left to do here.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.orientation import upright
-from runtime.conditioning.body import Body
-from solvers.compiled import kernel
-from solvers.floor_plane import FloorFit
+from runtime.conditioning.body_anatomy import BodyAnatomy
+from solvers.kernels.compiled import kernel
+from solvers.signal.floor_plane import FloorFit
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -46,7 +46,7 @@ class Levelling:
         body: the skeleton's anatomy.
     """
 
-    def __init__(self, body: Body) -> None:
+    def __init__(self, body: BodyAnatomy) -> None:
         self._feet = np.zeros(len(body.feet), _FOOT)
         self._feet["joint"], self._feet["rest"] = body.feet, body.feet_rest
         self._fit = FloorFit()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.compiled import kernel
+from solvers.kernels.compiled import kernel
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]

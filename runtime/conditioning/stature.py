@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.skeleton import Skeleton
-from solvers.compiled import kernel
-from solvers.continuity import distance
+from solvers.kernels.compiled import kernel
+from solvers.signal.continuity import distance
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]

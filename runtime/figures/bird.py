@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from devices.skeleton import Skeleton
-from runtime.character import Character, Material, Surface
+from runtime.characters.character import Character, Material, Surface
 from runtime.figures.plain import volume
 from runtime.figures.revolved import revolved
-from solvers.laplacian import Floats
+from solvers.linear.laplacian import Floats
 
 BIRD = "bird"
 _TAIL = 0.80  # metres from the middle: where the tail begins

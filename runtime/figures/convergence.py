@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from runtime.figures.plain import PlainSolver
 from runtime.figures.revolved import revolved
 from solvers.arap import ArapSolver
-from solvers.laplacian import Floats, Ints
+from solvers.linear.laplacian import Floats, Ints
 from solvers.squash_stretch import SquashStretchSolver
 
 FRAMES = 60

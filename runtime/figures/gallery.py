@@ -9,11 +9,11 @@ from types import TracebackType
 import numpy as np
 from numpy.typing import NDArray
 
-from runtime.character import Character
+from runtime.characters.character import Character
 from runtime.render.camera import front_camera
 from runtime.render.context import headless_context, release_headless
 from runtime.render.stage import Stage
-from solvers.laplacian import Floats, Ints
+from solvers.linear.laplacian import Floats, Ints
 
 _GAP = 0.16  # metres between two of a row
 _HANDLE_COLOUR = (0.05, 0.5, 0.12, 1.0)

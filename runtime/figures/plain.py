@@ -13,7 +13,7 @@ import scipy.sparse as sp
 import scipy.sparse.linalg as spla
 from scipy.sparse.csgraph import connected_components
 
-from solvers.laplacian import Floats, Ints, cotangent_edges, graph_laplacian
+from solvers.linear.laplacian import Floats, Ints, cotangent_edges, graph_laplacian
 
 
 class PlainSolver:

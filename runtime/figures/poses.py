@@ -8,9 +8,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from devices.errors import InputError
-from runtime.character import Character
+from runtime.characters.character import Character
 from solvers.arap import ArapSolver
-from solvers.laplacian import Floats, Ints
+from solvers.linear.laplacian import Floats, Ints
 
 _PATCH = 0.1  # of the height, at the foot and at the top
 _ITERATIONS = 3  # a frame, as the paper counts

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solvers.laplacian import Floats, Ints
+from solvers.linear.laplacian import Floats, Ints
 
 
 def revolved(x: Floats, radii: Floats, around: int) -> tuple[Floats, Ints]:

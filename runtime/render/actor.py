@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
-from runtime.character import Character, Material
+from runtime.characters.character import Character, Material
 from runtime.render.programs import release_all
 from runtime.render.smoothing import (
     DeformingNormals,

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
-from runtime.character import Character
-from solvers.compiled import kernel
+from runtime.characters.character import Character
+from solvers.kernels.compiled import kernel
 
 CREASE = math.radians(62.0)
 
 # Faces are worked on LANES at a time, in a flat array of 6 rows of LANES numbers. With a single
 # array and constant strides the compiler can prove that nothing overlaps, which it needs in order
-# to use vector instructions (as solvers/rotation_fit.py does).
+# to use vector instructions (as solvers/deform/rotation_fit.py does).
 LANES = 64
 
 _FLAT = 1e-28  # squared sine of an angle below which a face's normal is only what rounding left

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from devices.errors import InputError
-from runtime.character import Character
+from runtime.characters.character import Character
 from runtime.render.actor import Actor, ActorPrograms
 from runtime.render.background import Background
 from runtime.render.camera import Camera

@@ -11,11 +11,11 @@ import numpy as np
 from pythonosc.osc_message import OscMessage
 from scipy.spatial.transform import Rotation
 
-from devices.kinect_joints import KINECT_V2
-from devices.openni_joints import OPENNI
-from devices.rokoko_bones import SKELETON as ROKOKO
+from devices.kinect.joints import KINECT_V2
+from devices.osc.openni_joints import OPENNI
 from devices.skeleton import Skeleton
-from devices.xsens_segments import xsens_skeleton
+from devices.studio.rokoko_bones import SKELETON as ROKOKO
+from devices.studio.xsens_segments import xsens_skeleton
 from tests.devices.vmc_sender import message
 
 XSENS = xsens_skeleton()

@@ -17,17 +17,19 @@ from copy import deepcopy
 import numpy as np
 import pytest
 
-from devices import kinect_azure, kinect_v1, kinect_v2
-from devices.kinect_bodies import KinectDecoder
-from devices.landmark_messages import LandmarkDecoder
-from devices.leap_messages import LeapDecoder
-from devices.leapc import LeapCDecoder
-from devices.senders import Decoder
+from devices.kinect import azure as kinect_azure
+from devices.kinect import v1 as kinect_v1
+from devices.kinect import v2 as kinect_v2
+from devices.kinect.bodies import KinectDecoder
+from devices.leap.leapc import LeapCDecoder
+from devices.leap.messages import LeapDecoder
+from devices.mediapipe.landmark_messages import LandmarkDecoder
 from devices.skeleton import SkeletonFrame
-from tests.devices.test_kinect import azure_packet, v1_packet, v2_packet
-from tests.devices.test_landmark_stream import SIZE, person, rows, seen_at
-from tests.devices.test_landmark_stream import message as landmarks
-from tests.devices.test_leap_live import HEADER, both, device_event
+from devices.transport.senders import Decoder
+from tests.devices.kinect.test_kinect import azure_packet, v1_packet, v2_packet
+from tests.devices.leap.test_live import HEADER, both, device_event
+from tests.devices.mediapipe.test_landmark_stream import SIZE, person, rows, seen_at
+from tests.devices.mediapipe.test_landmark_stream import message as landmarks
 
 COUNT = int(os.environ.get("BUNRAKU_MUTATIONS", "2000"))
 TOKENS = [

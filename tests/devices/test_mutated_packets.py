@@ -15,15 +15,15 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from devices.kinect_joints import KINECT_V2
-from devices.nimate import NimateDecoder
-from devices.openni_joints import OPENNI
-from devices.rokoko import RokokoDecoder
-from devices.senders import Decoder
-from devices.vmc import PERFORMER, VmcDecoder
-from devices.vrchat import VrchatDecoder
-from devices.xsens import XsensDecoder
-from devices.xsens_segments import xsens_skeleton
+from devices.kinect.joints import KINECT_V2
+from devices.osc.nimate import NimateDecoder
+from devices.osc.openni_joints import OPENNI
+from devices.osc.vmc import PERFORMER, VmcDecoder
+from devices.osc.vrchat import VrchatDecoder
+from devices.studio.rokoko import RokokoDecoder
+from devices.studio.xsens import XsensDecoder
+from devices.studio.xsens_segments import xsens_skeleton
+from devices.transport.senders import Decoder
 from tests.devices import studio_senders as studio
 from tests.devices.vmc_sender import at, bones, bundle, message, ok, root, slime
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from devices.errors import InputError
-from devices.kinect_joints import KINECT_AZURE, KINECT_V1, KINECT_V2
+from devices.kinect.joints import KINECT_AZURE, KINECT_V1, KINECT_V2
 from devices.skeleton import Skeleton, SkeletonFrame
 
 

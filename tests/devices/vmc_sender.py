@@ -10,7 +10,7 @@ from pythonosc.osc_message import OscMessage
 from pythonosc.osc_message_builder import OscMessageBuilder
 from scipy.spatial.transform import Rotation
 
-from devices.humanoid import humanoid_skeleton
+from devices.bodies.humanoid import humanoid_skeleton
 
 MIRROR = np.diag([-1.0, 1.0, 1.0])
 HUMAN = humanoid_skeleton()

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from devices.skeleton import Skeleton
-from replay.player import EveryFrame, Pace, Player, RealTime
+from replay.player import EveryFrame, FrameTiming, Player, RealTime
 from replay.recording import Recording
 
 POINT = Skeleton(("point",), np.array([-1]), np.zeros((1, 3)))
@@ -203,7 +203,7 @@ def test_time_never_falls_whatever_is_done(
     loop: bool, real: bool, acts: list[tuple[str, float]]
 ) -> None:
     clock = Clock()
-    pace: Pace = RealTime(2.0, clock) if real else EveryFrame()
+    pace: FrameTiming = RealTime(2.0, clock) if real else EveryFrame()
     player = Player(recording(UNEVEN), pace, loop=loop)
     newest = -math.inf
     for act, amount in acts:

@@ -14,13 +14,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from devices.acts import performance
+from devices.builtin.motions import performance
+from devices.builtin.performance import RATE
 from devices.errors import InputError
-from devices.live_stream import Deliver, LiveStream
-from devices.performance import RATE
 from devices.skeleton import Skeleton, SkeletonFrame
-from replay.mcap_file import McapReader, read_mcap
-from replay.mcap_writer import McapWriter
+from devices.transport.live_stream import Deliver, LiveStream
+from replay.mcap.file import McapReader, read_mcap
+from replay.mcap.writer import McapWriter
 from replay.player import EveryFrame, Player
 from replay.recorded_stream import RecordedStream
 from replay.recorder import Recorder

@@ -9,23 +9,23 @@ from typing import Self
 import moderngl
 from numpy.typing import NDArray
 
-from devices.simulator import Simulator
+from devices.builtin.simulator import Simulator
 from replay.player import Player
 from replay.recorded_stream import RecordedStream
 from replay.recorder import Recorder
-from runtime.actions import Desk
 from runtime.conditioning.switches import Conditioning
-from runtime.director import Choices, Director
-from runtime.loop import FrameLoop
-from runtime.mapping import Mapping
+from runtime.control.actions import ShowControls
+from runtime.driving.mapping import Mapping
+from runtime.driving.match_session import Choices, MatchSession
+from runtime.driving.performer import Performer
 from runtime.output.output import PerformedFrame
-from runtime.output.report import Report
-from runtime.performer import Performer
-from runtime.puppet import Puppet
-from runtime.skin import Elasticity
-from runtime.takes import Takes
-from runtime.theatre import Theatre
-from tests.runtime.figures import BODY, FRONT_VIEW, T_POSE, frame, pose
+from runtime.output.report.report import Report
+from runtime.puppet.deformable_surface import Elasticity
+from runtime.puppet.puppet import Puppet
+from runtime.show.loop import FrameLoop
+from runtime.show.scene import Scene
+from runtime.show.takes import Takes
+from tests.runtime.stick_figures import BODY, FRONT_VIEW, T_POSE, frame, pose
 
 SIZE = (64, 36)
 
@@ -78,18 +78,18 @@ class Show:
         self.stream = stream
         recorded = RecordedStream(stream)
         self.performer = Performer(BODY)
-        self.director = Director(
+        self.match_session = MatchSession(
             self.performer, [puppet], lambda: FRONT_VIEW, Choices(patience=math.inf), [None]
         )
-        self.theatre = Theatre(context, SIZE, [puppet], BODY, clock=lambda: self.now)
+        self.scene = Scene(context, SIZE, [puppet], BODY, clock=lambda: self.now)
         self.switches = Conditioning()
         self.loop = FrameLoop(
             recorded,
             self.performer,
             [puppet],
-            director=self.director,
+            match_session=self.match_session,
             report=Report(None),
-            theatre=self.theatre,
+            scene=self.scene,
             outputs=[[self.seen]],
         )
         self.takes = Takes(
@@ -99,23 +99,23 @@ class Show:
             tell=self.told.append,
             waits=True,
         )
-        self.desk = Desk(
-            cues=self.director,
+        self.desk = ShowControls(
+            cues=self.match_session,
             stream=stream,
             conditioning=self.switches,
             loop=self.loop,
             skins=[puppet.skin],
             takes=self.takes,
-            theatre=self.theatre,
+            scene=self.scene,
         )
 
     def close(self) -> None:
         self.takes.close()
-        self.theatre.close()
+        self.scene.close()
 
     def strike(self, time: float = 0.0) -> Mapping:
         """Let the performer stand in a T pose for a moment; the mapping that is shown."""
         captured = frame(pose(T_POSE), time)
         self.performer.follow(captured)
-        self.director.direct(captured)
+        self.match_session.direct(captured)
         return self.puppet.mapping

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from devices.skeleton import Skeleton
-from runtime.character import Character, Material, Surface
+from runtime.characters.character import Character, Material, Surface
 from runtime.output.output import PerformedFrame
 
 RINGS, SIDES, NODES = 25, 12, 7

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from solvers.arap import ArapSolver
-from solvers.laplacian import graph_laplacian, half_cotangents, sum_over_faces
+from solvers.linear.laplacian import graph_laplacian, half_cotangents, sum_over_faces
 
 ENERGIES = ["spokes", "spokes-and-rims"]
 

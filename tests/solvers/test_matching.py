@@ -6,10 +6,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from solvers.abstraction import abstract, simplify
 from solvers.matching import TargetHierarchy, rank_matches
-from solvers.skeleton_pose import SkeletonPose
-from solvers.tree import Tree, extend_to_leaf
+from solvers.retarget.abstraction import abstract, simplify
+from solvers.skeleton.forward_kinematics import SkeletonPose
+from solvers.skeleton.tree import Tree, extend_to_leaf
 
 FRONT = np.eye(3)
 SQUID_ARMS = np.radians([0, 45, 90, 135, 180, 225, 270, 315])

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from replay.formats import read_recording
-from solvers.posture import most_different
+from solvers.retarget.posture import most_different
 from solvers.spacetime import (
     ACCELERATION,
     Constraint,

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from solvers.arap import ArapSolver
-from solvers.laplacian import cotangent_edges, graph_laplacian
+from solvers.linear.laplacian import cotangent_edges, graph_laplacian
 from solvers.squash_stretch import SquashStretchSolver
 
 ENERGIES = ["spokes", "spokes-and-rims"]

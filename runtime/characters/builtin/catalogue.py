@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from devices.errors import InputError
 from devices.skeleton import Skeleton
-from runtime.character import Character, Material, Surface
+from runtime.characters.character import Character, Material, Surface
 
 BUILTIN = ("squid", "cactus", "trex", "paper", "mannequin")
 """Names that `builtin_character` knows."""

@@ -1,0 +1,243 @@
+"""Which part of the body each joint of a skeleton is, whatever its names' convention."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from devices.bodies.joint_names import FINGERS, BodyPart, Kind, Side, part_of_name
+from devices.skeleton import Skeleton
+
+_SIDED = (Side.LEFT, Side.RIGHT)
+_BY_NUMBER = (Kind.THUMB, Kind.INDEX, Kind.MIDDLE, Kind.RING, Kind.LITTLE)
+_ENOUGH = 4  # parts told by names below which the shape of the skeleton is asked instead
+_MOST_JOINTS_BY_SHAPE = 1000  # more are no body; the search is quadratic
+
+
+def label_joints(skeleton: Skeleton) -> tuple[BodyPart | None, ...]:
+    """The part of the body that begins at each joint; None where nothing tells.
+
+    Names decide first (`devices.bodies.joint_names`); words that mean different joints in different
+    conventions are settled by what else the same side has; if names tell next to nothing, the
+    shape of the rest pose does, taking +X for the performer's left.
+    """
+    parts: list[BodyPart | None] = [part_of_name(name) for name in skeleton.names]
+    told = sum(part is not None and part.kind is not Kind.ROOT for part in parts)
+    if told < min(_ENOUGH, len(parts)) and len(parts) <= _MOST_JOINTS_BY_SHAPE:
+        shape = _label_by_shape(skeleton)
+        if any(part is not None for part in shape):
+            return tuple(shape)
+    for side in _SIDED:
+        _settle_limb(parts, side, skeleton)
+    _settle_centre(parts, skeleton)
+    _settle_fingers(parts, skeleton)
+    return tuple(parts)
+
+
+def heading_joints(skeleton: Skeleton) -> list[tuple[int, int]]:
+    """Pairs of joints (left, right) whose direction tells where the body faces: hips, shoulders."""
+    parts = label_joints(skeleton)
+    pairs = []
+    for kind in (Kind.UPPER_LEG, Kind.UPPER_ARM):
+        left, right = (first_of(parts, skeleton, kind, side) for side in _SIDED)
+        if left is not None and right is not None:
+            pairs.append((left, right))
+    return pairs
+
+
+def hips_joint(skeleton: Skeleton) -> int:
+    """The joint that carries the body: the hips, else the skeleton's root.
+
+    Not always the root itself: some rigs put one on the floor that does not follow the body.
+    """
+    hips = first_of(label_joints(skeleton), skeleton, Kind.HIPS)
+    return skeleton.root if hips is None else hips
+
+
+def first_of(
+    parts: Sequence[BodyPart | None], skeleton: Skeleton, kind: Kind, side: Side = Side.CENTRE
+) -> int | None:
+    """The joint nearest to the root that begins `kind` on `side`, or None."""
+    for joint in skeleton.order:
+        part = parts[joint]
+        if part is not None and part.kind is kind and part.side is side and not part.tip:
+            return joint
+    return None
+
+
+def _settle_limb(parts: list[BodyPart | None], side: Side, skeleton: Skeleton) -> None:
+    """Decide on one side what "shoulder", "hip", "arm", "leg" and "foot" stand for.
+
+    Kinect and SMPL name points, so that the upper arm begins at "ShoulderLeft" and toes at
+    "FootLeft"; rigs name bones, so that the clavicle is "LeftShoulder" and the shin "LeftLeg".
+    """
+
+    def joints(*words: str) -> list[int]:
+        return [
+            joint
+            for joint in skeleton.order
+            if (part := parts[joint]) is not None
+            and part.side is side
+            and not part.tip
+            and part.word in words
+        ]
+
+    def has(kind: Kind) -> bool:
+        return first_of(parts, skeleton, kind, side) is not None
+
+    def settle(chosen: list[int], kind: Kind) -> None:
+        for joint in chosen:
+            part = parts[joint]
+            assert part is not None
+            parts[joint] = replace(part, kind=kind)
+
+    if not has(Kind.UPPER_ARM) and (has(Kind.LOWER_ARM) or has(Kind.HAND)):
+        settle(joints("shoulder", "shldr")[-1:], Kind.UPPER_ARM)
+    if not has(Kind.UPPER_LEG):
+        settle(joints("hip")[-1:], Kind.UPPER_LEG)
+    legs = joints("leg")
+    if not has(Kind.UPPER_LEG) and (len(legs) == 2 or joints("knee", "shin", "calf", "lowerleg")):
+        settle(legs[:1], Kind.UPPER_LEG)
+    if joints("ankle"):
+        settle(joints("foot"), Kind.TOES)
+
+
+def _settle_centre(parts: list[BodyPart | None], skeleton: Skeleton) -> None:
+    """A root that branches is the hips where nothing else is; a nose is the head where none is."""
+    if first_of(parts, skeleton, Kind.HIPS) is None:
+        for joint in skeleton.order:
+            part = parts[joint]
+            branches = np.count_nonzero(skeleton.parents == joint) > 1
+            if part is not None and part.kind is Kind.ROOT and branches:
+                parts[joint] = replace(part, kind=Kind.HIPS)
+                break
+    if first_of(parts, skeleton, Kind.HEAD) is None:
+        for joint, part in enumerate(parts):
+            if part is not None and part.word == "nose" and not part.tip:
+                parts[joint] = replace(part, kind=Kind.HEAD)
+                break
+
+
+def _settle_fingers(parts: list[BodyPart | None], skeleton: Skeleton) -> None:
+    """Tell numbered fingers apart, and give what hangs on a finger without a side its hand's side.
+
+    MakeHuman counts fingers from 1 and metacarpals from the index finger; 3ds Max Biped counts
+    from 0 and writes the second bone of finger 1 as 11.
+    """
+    numbered = [part for part in parts if part is not None and part.word == "finger"]
+    from_zero = any(part.number == 0 for part in numbered)
+    for joint in skeleton.order:
+        part = parts[joint]
+        if part is None or part.kind not in FINGERS:
+            continue
+        if part.kind is Kind.FINGER and part.number is not None:
+            number = int(str(part.number)[0]) if from_zero else part.number - 1
+            number = number + 1 if part.word == "metacarpal" else number
+            if 0 <= number < len(_BY_NUMBER):
+                part = replace(part, kind=_BY_NUMBER[number])
+        above = parts[skeleton.parents[joint]] if skeleton.parents[joint] >= 0 else None
+        if part.side is Side.CENTRE and above is not None:
+            part = replace(part, side=above.side)
+        parts[joint] = part
+
+
+def _label_by_shape(skeleton: Skeleton) -> list[BodyPart | None]:
+    """Parts of an upright body with two legs, two arms and a head, found by the rest pose alone."""
+    parts: list[BodyPart | None] = [None] * len(skeleton.names)
+    rest = skeleton.rest_positions
+    size = float(np.ptp(rest, axis=0).max())
+    hips = _fork(skeleton, skeleton.root, 0.2 * size)
+    if hips is None:
+        return parts
+    limbs = [_longest_chain(skeleton, child) for child in _branches(skeleton, hips, 0.2 * size)]
+    legs = _pair([limb for limb in limbs if rest[limb[-1], 1] < rest[hips, 1]], rest, hips)
+    rising = [limb for limb in limbs if rest[limb[-1], 1] > rest[hips, 1] + 0.15 * size]
+    if legs is None or len(rising) != 1:
+        return parts
+    chest = _fork(skeleton, rising[0][0], 0.12 * size)
+    if chest is None:
+        return parts
+    limbs = [_longest_chain(skeleton, child) for child in _branches(skeleton, chest, 0.12 * size)]
+    arms = _pair(limbs, rest, chest)
+    if arms is None:
+        return parts
+    joint = chest
+    while joint != hips:
+        parts[joint] = BodyPart(Kind.CHEST if joint == chest else Kind.SPINE)
+        joint = int(skeleton.parents[joint])
+    parts[hips] = BodyPart(Kind.HIPS)
+    for limb in limbs:
+        if limb not in arms:
+            parts[limb[0]] = BodyPart(Kind.NECK if len(limb) > 1 else Kind.HEAD)
+            for joint in limb[1:]:
+                parts[joint] = BodyPart(Kind.HEAD)
+    for side, arm, leg in zip(_SIDED, arms, legs, strict=True):
+        _label_limb(parts, rest, arm, (Kind.UPPER_ARM, Kind.LOWER_ARM, Kind.HAND), side)
+        _label_limb(parts, rest, leg, (Kind.UPPER_LEG, Kind.LOWER_LEG, Kind.FOOT), side)
+    return parts
+
+
+def _branches(skeleton: Skeleton, joint: int, least: float) -> list[int]:
+    """Children of `joint` whose branch reaches at least `least` [m] away from it."""
+    rest = skeleton.rest_positions
+    return [
+        int(child)
+        for child in np.flatnonzero(skeleton.parents == joint)
+        if np.linalg.norm(rest[_longest_chain(skeleton, int(child))] - rest[joint], axis=1).max()
+        >= least
+    ]
+
+
+def _fork(skeleton: Skeleton, joint: int, least: float) -> int | None:
+    """The first joint from `joint` outwards where three or more long branches part."""
+    while True:
+        branches = _branches(skeleton, joint, least)
+        if len(branches) >= 3:
+            return joint
+        if len(branches) != 1:
+            return None
+        joint = branches[0]
+
+
+def _longest_chain(skeleton: Skeleton, joint: int) -> list[int]:
+    """Joints from `joint` to the leaf that is furthest along the bones."""
+    rest = skeleton.rest_positions
+    length = {joint: 0.0}
+    for child in skeleton.order:
+        parent = int(skeleton.parents[child])
+        if parent in length and child != joint:
+            length[child] = length[parent] + float(np.linalg.norm(rest[child] - rest[parent]))
+    chain = [max(length, key=lambda end: length[end])]
+    while chain[-1] != joint:
+        chain.append(int(skeleton.parents[chain[-1]]))
+    return chain[::-1]
+
+
+def _pair(
+    limbs: list[list[int]], rest: NDArray[np.float64], centre: int
+) -> tuple[list[int], list[int]] | None:
+    """The two limbs, left first, that end furthest to either side, if they are alike in length."""
+    if len(limbs) < 2:
+        return None
+    ends = [float(rest[limb[-1], 0] - rest[centre, 0]) for limb in limbs]
+    left, right = int(np.argmax(ends)), int(np.argmin(ends))
+    if ends[left] <= 0 or ends[right] >= 0 or len(limbs[left]) != len(limbs[right]):
+        return None
+    return limbs[left], limbs[right]
+
+
+def _label_limb(
+    parts: list[BodyPart | None],
+    rest: NDArray[np.float64],
+    limb: list[int],
+    kinds: tuple[Kind, Kind, Kind],
+    side: Side,
+) -> None:
+    """Name a chain from its root on: the elbow or knee lies halfway, the hand at the end."""
+    along = np.linalg.norm(np.diff(rest[limb], axis=0), axis=1).cumsum()
+    for place, joint in enumerate(limb):
+        s = along[place - 1] / max(along[-1], 1e-12) if place else 0.0
+        parts[joint] = BodyPart(kinds[0 if s < 0.35 else 1 if s < 0.75 else 2], side)

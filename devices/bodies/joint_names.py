@@ -1,0 +1,208 @@
+"""What a joint's name says about the body: side and part, whatever convention it follows.
+
+Names are cut into words (camel case, digits, separators, name spaces, the prefixes of rigs), the
+side is taken out, and what is left is looked up in the tables below. The tables cover Kinect v1, v2
+and Azure, CMU (ASF and the BVH conversions), Bandai-Namco, Mixamo, MotionBuilder, MakeHuman, DAZ,
+3ds Max Biped, Unity and VRM humanoids, Unreal, Rigify, Rokoko, Xsens, OptiTrack, SMPL, OpenPose,
+MediaPipe, Leap Motion and OpenXR.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from enum import StrEnum
+from functools import lru_cache
+from itertools import pairwise
+
+
+class Side(StrEnum):
+    """Which side of the performer's own body a joint is on."""
+
+    LEFT = "left"
+    RIGHT = "right"
+    CENTRE = "centre"
+
+
+class Kind(StrEnum):
+    """Which part of the body begins at a joint: UPPER_ARM is at the shoulder, FOOT at the ankle."""
+
+    ROOT = "root"
+    HIPS = "hips"
+    SPINE = "spine"
+    CHEST = "chest"
+    NECK = "neck"
+    HEAD = "head"
+    SHOULDER = "shoulder"
+    UPPER_ARM = "upper arm"
+    LOWER_ARM = "lower arm"
+    HAND = "hand"
+    THUMB = "thumb"
+    INDEX = "index finger"
+    MIDDLE = "middle finger"
+    RING = "ring finger"
+    LITTLE = "little finger"
+    FINGER = "finger"
+    UPPER_LEG = "upper leg"
+    LOWER_LEG = "lower leg"
+    FOOT = "foot"
+    TOES = "toes"
+    TAIL = "tail"
+    FACE = "face"
+    HELPER = "helper"
+
+
+FINGERS = (Kind.THUMB, Kind.INDEX, Kind.MIDDLE, Kind.RING, Kind.LITTLE, Kind.FINGER)
+
+
+@dataclass(frozen=True, slots=True)
+class BodyPart:
+    """The part of the body that begins at a joint.
+
+    Attributes:
+        kind: the part.
+        side: the performer's own left or right, or the centre.
+        tip: the joint only ends the part (head top, finger tip, an end site); nothing moves there.
+        word: the word of the name that told; "shoulder", "hip", "leg", "foot" mean different joints
+            in different conventions, and `devices.bodies.joint_labels` decides between them.
+        number: the first number in the name, or None ("finger2-1" has 2).
+    """
+
+    kind: Kind
+    side: Side = Side.CENTRE
+    tip: bool = False
+    word: str = ""
+    number: int | None = None
+
+
+def _listed(words: str) -> list[str]:
+    return words.split()
+
+
+_WORDS: dict[Kind, str] = {
+    Kind.ROOT: "root reference armature origin worldroot jointroot skeleton master global",
+    Kind.HIPS: "hips hip pelvis hipcenter hipcentre spinebase hipjoint buttock midhip cog",
+    Kind.SPINE: "spine spinemid spinenavel abdomen abdomenlower abdomenupper lowerback torso waist "
+    "belly navel ab stomach back backbone lumbar spinelower body",
+    Kind.CHEST: "chest upperchest spinechest spineshoulder shouldercenter shouldercentre thorax "
+    "sternum upperback chestlower chestupper ribcage ribs midshoulder midshoulders spineupper",
+    Kind.NECK: "neck lowerneck upperneck neckbase necklower neckupper",
+    Kind.HEAD: "head skull headcenter",
+    Kind.SHOULDER: "shoulder shldr clavicle collar collarbone scapula clav",
+    Kind.UPPER_ARM: "arm upperarm uparm uarm humerus shoulderbend shldrbend bicep",
+    Kind.LOWER_ARM: "forearm lowerarm loarm lowarm farm radius ulna elbow forearmbend",
+    Kind.HAND: "hand wrist palm lowerhand",
+    Kind.THUMB: "thumb",
+    Kind.INDEX: "index pointer forefinger indexfinger",
+    Kind.MIDDLE: "middle middlefinger",
+    Kind.RING: "ring ringfinger",
+    Kind.LITTLE: "little pinky pinkie littlefinger pinkyfinger",
+    Kind.FINGER: "finger fingers fingerbase metacarpal fingertip pointable carpal",
+    Kind.UPPER_LEG: "upleg upperleg thigh femur uleg thighbend",
+    Kind.LOWER_LEG: "leg lowerleg lowleg loleg shin calf tibia knee crus",
+    Kind.FOOT: "foot ankle tarsal hock paw",
+    Kind.TOES: "toe toes toebase ball footindex metatarsal metatarsals bigtoe football smalltoe",
+    Kind.TAIL: "tail",
+    Kind.FACE: "face eye eyes eyelid eyebrow brow ear nose mouth jaw lip lips teeth tooth tongue "
+    "cheek chin lid levator oris orbicularis temporalis oculi risorius special forehead nasal "
+    "nostril headset pupil snout whisker",
+    Kind.HELPER: "twist roll helper ik fk pole target ctrl control effector socket weapon prop "
+    "hair ponytail bangs beard hat breast boob bust skirt cape cloth sleeve secondary sec heel "
+    "deltoid pectoral glute attach attachment locator camera marker collider holder",
+}
+_KIND_OF_WORD = {word: kind for kind, words in _WORDS.items() for word in words.split()}
+# Looked for inside a name of several words, before and after its neighbouring words are tried in
+# pairs: "LeftHandThumb1" is a thumb, "thigh_twist_l" a helper, "upper_leg_front" an upper leg.
+_FIRST = (
+    *_WORDS[Kind.HELPER].split(),
+    *(word for kind in FINGERS for word in _WORDS[kind].split()),
+    *_WORDS[Kind.FACE].split(),
+    *_WORDS[Kind.TAIL].split(),
+)
+_LAST = _listed(
+    "toe toes metatarsal elbow wrist palm knee ankle forearm thigh shin calf clavicle collar neck "
+    "head chest spine pelvis hips foot hand shoulder shldr leg arm hip"
+)
+_NOISE = set(
+    _listed(
+        "bip bn def org mch mixamorig cc base j jnt joint bone valvebiped sk rig char character "
+        "biped f d actor skel tracker n b m x bvh npc"
+    )
+)
+_SIDES = (
+    *((mark, Side.LEFT) for mark in ("left", "lft", "l")),
+    *((mark, Side.RIGHT) for mark in ("right", "rgt", "rt", "r")),
+)
+_CENTRE = {"center", "centre", "mid", "c"}
+_END = {"end", "nub", "tip", "top", "endsite", "site", "leaf"}
+_SPLIT = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
+_PREFIX = re.compile(r"^(Bip\d+|ValveBiped|CC_Base|mixamorig\d*)[ _.]+", re.IGNORECASE)
+_VERTEBRA = re.compile(r"^[LTC]\d{1,2}$")  # Xsens: L5, L3, T12, T8
+
+
+@lru_cache(maxsize=16384)
+def part_of_name(name: str) -> BodyPart | None:
+    """The part of the body that a joint's name alone stands for, or None for an unknown name."""
+    plain = re.split(r"[:|]", name)[-1].strip()
+    if _VERTEBRA.match(plain):
+        return BodyPart(Kind.CHEST if plain[0] == "T" else Kind.SPINE, word="spine")
+    if plain.startswith("__"):
+        return BodyPart(
+            Kind.HELPER, word="helper"
+        )  # MakeHuman's stub before a bone set off its parent
+    plain = _PREFIX.sub("", plain) or plain
+    tokens = [token.lower() for token in _SPLIT.findall(plain)]
+    digits = [int(token) for token in tokens if token.isdigit() and len(token) < 4]
+    words, side = _take_side([token for token in tokens if not token.isdigit()])
+    words, tip = _take_tip(words)
+    word = _word_of(words, side)
+    if word is None:
+        return None
+    return BodyPart(_KIND_OF_WORD[word], side, tip, word, digits[0] if digits else None)
+
+
+def _take_side(words: list[str]) -> tuple[list[str], Side]:
+    """Words without the one that names a side, even where it is glued on: "lhumerus"."""
+    whole = "".join(words)
+    if whole not in _KIND_OF_WORD:
+        for mark, side in _SIDES:
+            if whole.startswith(mark) and whole.removeprefix(mark) in _KIND_OF_WORD:
+                return [whole.removeprefix(mark)], side  # "LUArm", "LHipJoint"
+    for place, word in enumerate(words):
+        for mark, side in _SIDES:
+            if word == mark:
+                return words[:place] + words[place + 1 :], side
+            glued = word not in _KIND_OF_WORD and word.startswith(mark)
+            rest = word.removeprefix(mark) if glued else word.removesuffix(mark)
+            if rest != word and rest in _KIND_OF_WORD and (glued or len(mark) > 1):
+                return [*words[:place], rest, *words[place + 1 :]], side
+    return words, Side.CENTRE
+
+
+def _take_tip(words: list[str]) -> tuple[list[str], bool]:
+    kept = [word for word in words if word not in _END]
+    return (kept, len(kept) < len(words)) if kept else (words, False)
+
+
+def _word_of(words: list[str], side: Side) -> str | None:
+    """The table's word that the words of a name amount to, or None."""
+    if words == ["mid"] and side is not Side.CENTRE:
+        return "middle"  # DAZ: rMid1
+    if "".join(words) in _KIND_OF_WORD:
+        return "".join(words)  # Kinect: SpineBase, where "base" alone would be noise
+    central = any(word in _CENTRE for word in words)
+    words = [word for word in words if word not in _CENTRE | _NOISE]
+    whole = "".join(words)
+    if central and side is Side.CENTRE and whole.rstrip("s") in ("hip", "shoulder"):
+        return whole.rstrip("s") + "center"
+    if whole in _KIND_OF_WORD:
+        return whole
+    if "neck" in words:
+        return "neck"  # Character Creator's NeckTwist is the neck itself
+    pairs = [a + b for a, b in pairwise(words)] + [b + a for a, b in pairwise(words)]
+    candidates = [word for word in _FIRST if word in words]
+    candidates += [pair for pair in pairs if pair in _KIND_OF_WORD]
+    candidates += [word for word in _LAST if word in words]
+    candidates += [word for word in words if word in _KIND_OF_WORD]
+    candidates += [word for word in _LAST if len(word) > 3 and word in whole]
+    return candidates[0] if candidates else None

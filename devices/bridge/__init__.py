@@ -1,0 +1,1 @@
+"""A performer on another machine: the receiving end of `bunraku bridge`."""

@@ -1,0 +1,1 @@
+"""The built-in performer, who needs no hardware: `sim://`."""

@@ -1,0 +1,108 @@
+"""Performers who are always there: ``sim://show``, ``sim://wave`` and so on, looping for ever.
+
+Option: ``performers=N``, who stand side by side, each a second behind the one before.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import Self
+from urllib.parse import SplitResult
+
+import numpy as np
+
+from devices.address import options_of
+from devices.builtin.motions import ACTS, performance
+from devices.builtin.performance import RATE, Performance
+from devices.skeleton import Skeleton, SkeletonFrame
+
+BACKLOG_SECONDS = 1.0
+"""What lies further back than this when a poll comes is not given any more."""
+MOST_PERFORMERS = 64
+_APART = 1.2  # [m] between one performer and the next
+
+
+class Simulator:
+    """A live source of motion without a sensor: 60 frames a second on the host's clock.
+
+    Args:
+        performance: what is played, again and again.
+        performers: how many play it.
+        clock: host monotonic time [s]; the performance begins with the first poll.
+    """
+
+    def __init__(
+        self,
+        performance: Performance,
+        clock: Callable[[], float] = time.perf_counter,
+        *,
+        performers: int = 1,
+    ) -> None:
+        self._performance = performance
+        self._performers = range(performers)
+        self._clock = clock
+        self._start: float | None = None
+        self._next = 0
+        self._closed = False
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """The puppet body, the same for every performance."""
+        return self._performance.skeleton
+
+    @property
+    def ended(self) -> bool:
+        """True only once it is closed."""
+        return self._closed
+
+    def poll(self) -> Sequence[SkeletonFrame]:
+        """Every frame that is due by now, oldest first, at most those of the last second."""
+        if self._closed:
+            return []
+        now = self._clock()
+        if self._start is None:
+            self._start = now
+        # A hair of a frame, so that a clock that ticks in frames is not one short by rounding.
+        due = int((now - self._start) * RATE + 1e-6) + 1
+        first = max(self._next, due - int(BACKLOG_SECONDS * RATE))
+        self._next = max(self._next, due)
+        return [
+            self._frame(number, performer, self._start, now)
+            for number in range(first, due)
+            for performer in self._performers
+        ]
+
+    def _frame(self, number: int, performer: int, start: float, now: float) -> SkeletonFrame:
+        index = (number - performer * int(RATE)) % len(self._performance.times)
+        aside = np.array([_APART * ((performer + 1) // 2) * (-1) ** performer, 0.0, 0.0])
+        return SkeletonFrame(
+            time=start + number / RATE,
+            positions=self._performance.positions[index] + aside,
+            rotations=self._performance.rotations[index],
+            confidence=np.ones(len(self.skeleton.names)),
+            performer=performer,
+            arrival=now,
+        )
+
+    def close(self) -> None:
+        """Let the performer go."""
+        self._closed = True
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
+
+
+def open_device(address: SplitResult) -> Simulator:
+    """Open ``sim://ACT``; the first act where none is named."""
+    options = options_of(address, {"performers": _company})
+    return Simulator(performance(address.netloc or ACTS[0]), **options)
+
+
+def _company(text: str) -> int:
+    if not (text.isascii() and text.isdigit() and 1 <= int(text[:9]) <= MOST_PERFORMERS):
+        raise ValueError(f"expected a whole number from 1 to {MOST_PERFORMERS}")
+    return int(text)

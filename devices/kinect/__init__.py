@@ -1,0 +1,1 @@
+"""Kinect v1, v2 and Azure, by their makers' libraries: `kinect://`."""

@@ -1,0 +1,171 @@
+"""Bodies as a depth camera reports them, made into frames: what all Kinects have in common.
+
+Camera axes become ours as `devices.kinect.joints` says; the floor is y = 0 and upright by
+`devices.bodies.floor_level`, and the camera stands above the origin. Orientations keep the local
+axes that the SDK gives a joint and are turned into the world; an SDK's all-zero quaternion means
+that there is none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from devices.bodies.body_numbers import BodyNumbers
+from devices.bodies.floor_level import FloorLevel
+from devices.skeleton import Skeleton, SkeletonFrame
+from devices.transport.clock_map import ClockMap
+
+Array = NDArray[np.float64]
+
+FURTHEST = 100.0  # [m] no depth camera sees so far
+_SURE = 0.75  # confidence from which a foot says where the floor is
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SensorBody:
+    """One person in one frame.
+
+    Attributes:
+        id: the sensor's own number for the person.
+        positions: (J, 3) [m] camera axes.
+        rotations: (J, 4) joint to camera, (x, y, z, w); all zero where there is none.
+        confidence: (J,) in [0, 1]; 0 where the position says nothing.
+    """
+
+    id: int
+    positions: Array
+    rotations: Array
+    confidence: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sight:
+    """What a sensor saw at one moment.
+
+    Attributes:
+        time: [s] of the sensor's clock.
+        bodies: everyone who is tracked.
+        up: (3,) the floor's normal in camera axes; all zero where it is not known.
+        height: [m] of the camera above the floor; NaN where it is not known.
+    """
+
+    time: float
+    bodies: Sequence[SensorBody]
+    up: Array
+    height: float = float("nan")
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Sensor:
+    """A kind of Kinect.
+
+    Attributes:
+        skeleton: its joints.
+        to_world: (3, 3) camera axes to ours.
+        feet: the joints that stand on the floor.
+        read: makes a `Sight` of the bytes of one SDK frame; raises ValueError where they are none.
+    """
+
+    skeleton: Skeleton
+    to_world: Array
+    feet: tuple[str, ...]
+    read: Callable[[bytes], Sight]
+
+
+class KinectDecoder:
+    """Frames of everyone whom a sensor sees, from the bytes of its SDK's frames.
+
+    Args:
+        sensor: which kind it is.
+        level: whether the floor is found and made y = 0; else the camera is the origin.
+
+    Attributes:
+        refused: how many frames of bytes were none.
+    """
+
+    def __init__(self, sensor: Sensor, *, level: bool = True) -> None:
+        self._sensor = sensor
+        self._level = level
+        self._floor = FloorLevel()
+        self._numbers = BodyNumbers()
+        self._clock = ClockMap()
+        self._feet = [sensor.skeleton.index(name) for name in sensor.feet]
+        self.refused = 0
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """The sensor's joints."""
+        return self._sensor.skeleton
+
+    @np.errstate(over="ignore", invalid="ignore")  # whatever a damaged packet holds
+    def feed(self, data: bytes, arrival: float) -> Sequence[SkeletonFrame]:
+        """A frame of each person in the SDK's frame `data` that came at `arrival` [s]."""
+        try:
+            sight = self._sensor.read(data)
+        except ValueError:
+            self.refused += 1
+            return []
+        time = self._clock.host_time(sight.time, arrival)
+        bodies = {body.id: _in_world(body, self._sensor.to_world) for body in sight.bodies}
+        if self._level:
+            self._learn_floor(sight, list(bodies.values()))
+        numbers = self._numbers({body.id: _middle(body) for body in bodies.values()})
+        return [
+            self._frame(body, numbers[body.id], time, arrival)
+            for body in sorted(bodies.values(), key=lambda body: numbers[body.id])
+        ]
+
+    def _learn_floor(self, sight: Sight, bodies: Sequence[SensorBody]) -> None:
+        self._floor.learn(self._sensor.to_world @ sight.up, sight.height)
+        for body in bodies:
+            feet = body.positions[self._feet][body.confidence[self._feet] > _SURE]
+            if len(feet):
+                self._floor.stand(float((feet @ self._floor.turn[1]).min()))
+
+    def _frame(self, body: SensorBody, number: int, time: float, arrival: float) -> SkeletonFrame:
+        turn, height = np.eye(3), 0.0
+        if self._level:
+            turn, height = self._floor.turn, self._floor.height
+        return SkeletonFrame(
+            time=time,
+            positions=body.positions @ turn.T + [0.0, height, 0.0],
+            rotations=_turned(body.rotations, turn @ self._sensor.to_world),
+            confidence=body.confidence,
+            performer=number,
+            arrival=arrival,
+        )
+
+
+def _middle(body: SensorBody) -> Array:
+    """(3,) [m] the mean of the joints that are seen; NaN where none is."""
+    seen = body.positions[body.confidence > 0.0]
+    return np.mean(seen, axis=0) if len(seen) else np.full(3, np.nan)
+
+
+def _in_world(body: SensorBody, to_world: Array) -> SensorBody:
+    """The body with its places, not yet its turns, in our axes; NaN and confidence 0 where nothing
+    can be there."""
+    near = (np.abs(body.positions) < FURTHEST).all(axis=1)  # False for NaN
+    seen = near & (body.confidence > 0.0) & (body.positions != 0.0).any(axis=1)
+    positions = np.full_like(body.positions, np.nan)
+    positions[seen] = body.positions[seen] @ to_world.T
+    return replace(
+        body,
+        positions=positions,
+        confidence=np.where(seen, np.clip(body.confidence, 0.0, 1.0), 0.0),
+    )
+
+
+def _turned(rotations: Array, turn: Array) -> Array:
+    """Rotations (J, 4) with `turn` (3, 3) after them; NaN where one is no rotation."""
+    length = np.linalg.norm(rotations, axis=1)
+    known = (length > 0.5) & (length < 2.0)  # False for NaN
+    out = np.full_like(rotations, np.nan)
+    if known.any():
+        out[known] = (Rotation.from_matrix(turn) * Rotation.from_quat(rotations[known])).as_quat()
+    return out

@@ -1,0 +1,1 @@
+"""Leap Motion hands, by LeapC or by WebSocket: `leap://` and `leap+ws://`."""

@@ -1,0 +1,96 @@
+"""The Leap Motion's WebSocket protocol, one JSON message at a time.
+
+The first message is a header with the version of the protocol; then come frames, and events that
+say which devices are plugged in and seeing. A server of an older protocol is taken as it is.
+Source: leapjs, lib/protocol.js; Leap developer archive, "Leap_JSON".
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from devices.leap.hands import leap_frame
+from devices.leap.performer import BOTH, LeapPerformer
+from devices.skeleton import Skeleton, SkeletonFrame
+from devices.transport.clock_map import ClockMap
+
+MOST_BYTES = 1 << 20
+MOST_DEVICES = 16
+
+
+class LeapDecoder:
+    """Frames of a performer's hands from messages of the WebSocket.
+
+    Attributes:
+        version: of the protocol that the server speaks; None before its header came.
+        devices: of each device by its id, whether it is attached and whether it is seeing.
+        refused: how many messages were none of this protocol.
+    """
+
+    def __init__(self, hands: str = BOTH) -> None:
+        self._performer = LeapPerformer(hands)
+        self._clock = ClockMap()
+        self.version: int | None = None
+        self.devices: dict[str, tuple[bool, bool]] = {}
+        self.refused = 0
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """Both hands, or the one that was asked for."""
+        return self._performer.skeleton
+
+    @property
+    def trouble(self) -> str:
+        """One line on why no frames come, as far as the server's events say; else an empty one."""
+        states = self.devices.values()
+        if not states or any(attached and streaming for attached, streaming in states):
+            return ""
+        if any(attached for attached, _ in states):
+            return "the Leap is plugged in but sees nothing; resume it in its control panel"
+        return "the Leap is not plugged in"
+
+    def feed(self, data: bytes, arrival: float) -> Sequence[SkeletonFrame]:
+        """The frame in a message that came at `arrival` [s]; none for a header or an event."""
+        message = _message(data)
+        if isinstance(message.get("hands"), list):
+            return [self._frame(message, arrival)]
+        if not (self._header(message) or self._event(message.get("event"))):
+            self.refused += 1
+        return []
+
+    def _frame(self, message: Mapping[str, Any], arrival: float) -> SkeletonFrame:
+        found = leap_frame(message)
+        stamp = found.timestamp
+        time = arrival if stamp is None else self._clock.host_time(stamp * 1e-6, arrival)
+        return self._performer.frame(found.hands, time, arrival)
+
+    def _header(self, message: Mapping[str, Any]) -> bool:
+        version = message.get("version")
+        if not isinstance(version, int) or isinstance(version, bool) or "event" in message:
+            return False
+        self.version = version
+        self.devices.clear()  # a new connection tells of them again
+        return True
+
+    def _event(self, event: Any) -> bool:
+        if not isinstance(event, dict) or not isinstance(event.get("type"), str):
+            return False
+        state = event.get("state")
+        if event["type"] == "deviceEvent" and isinstance(state, dict):
+            name = str(state.get("id"))[:64]
+            if name in self.devices or len(self.devices) < MOST_DEVICES:
+                self.devices[name] = (state.get("attached") is True, state.get("streaming") is True)
+        return True
+
+
+def _message(data: bytes) -> dict[str, Any]:
+    """The JSON object in `data`; an empty one where there is none."""
+    if len(data) > MOST_BYTES:
+        return {}
+    try:
+        message = json.loads(data)
+    except (ValueError, RecursionError):
+        return {}
+    return message if isinstance(message, dict) else {}

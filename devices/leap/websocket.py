@@ -1,0 +1,132 @@
+"""The Leap Motion's WebSocket: ``leap+ws://127.0.0.1:6437``.
+
+The service answers there, or `UltraleapTrackingWebSocket` beside newer ones. A service that was
+stopped is tried again twice a second, and told anew what we want of it, since it remembers nothing
+of a connection. One that closes with code 1001 before it has said anything does not know the
+version of the protocol that was asked for: the next lower one is asked for then, and after the
+lowest the newest again.
+Source: leapjs, lib/connection/base.js.
+"""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections.abc import Callable, Iterator
+from typing import Any
+from urllib.parse import SplitResult
+
+from devices.address import host_and_port, one_of, options_of
+from devices.errors import InputError
+from devices.leap.messages import MOST_BYTES, LeapDecoder
+from devices.leap.performer import BOTH
+from devices.transport.live_stream import Deliver, LiveStream
+
+PORT = 6437
+NEWEST = 6
+RETRY = 0.5  # [s]
+PATIENCE = 3.0  # [s] for an answer
+LOOK = 0.1  # [s] after which the reader looks whether it is closed
+GOING_AWAY = 1001
+SETTINGS = ({"background": True}, {"focused": True}, {"optimizeHMD": False})
+
+
+class LeapWebSocket:
+    """A connection that comes back by itself.
+
+    Args:
+        host, port: where the service answers.
+        devices: one line on what is wrong with the devices that the service has, or an empty one.
+
+    Attributes:
+        dropped: always 0; what the service does not send is not counted.
+        version: of the protocol that is asked for.
+
+    Raises:
+        InputError: the library for WebSockets is not installed.
+    """
+
+    dropped = 0
+
+    def __init__(self, host: str, port: int, devices: Callable[[], str] = str) -> None:
+        try:
+            import websockets.sync.client  # noqa: F401, PLC0415
+        except ImportError:
+            raise InputError("leap+ws:// needs the extra: pip install 'bunraku[leap]'") from None
+        self.version = NEWEST
+        self._where = f"{'[' + host + ']' if ':' in host else host}:{port}"
+        self._devices = devices
+        self._connection_trouble = ""
+        self._closing = threading.Event()
+
+    @property
+    def trouble(self) -> str:
+        """Why no frames come just now."""
+        return self._connection_trouble or self._devices()
+
+    def run(self, deliver: Deliver) -> None:
+        """Deliver every message until it is closed, from one connection after another."""
+        while not self._closing.is_set():
+            self._connect(deliver)
+            self._closing.wait(RETRY)
+
+    def close(self) -> None:
+        """Let `run` return soon; may be called twice."""
+        self._closing.set()
+
+    def _connect(self, deliver: Deliver) -> None:
+        from websockets.exceptions import ConnectionClosed, WebSocketException  # noqa: PLC0415
+        from websockets.sync.client import connect  # noqa: PLC0415
+
+        url = f"ws://{self._where}/v{self.version}.json"
+        verified = False
+        try:
+            with connect(
+                url, open_timeout=PATIENCE, close_timeout=LOOK, max_size=MOST_BYTES, proxy=None
+            ) as connection:
+                for data in self._messages(connection):
+                    if not verified:
+                        self._ask(connection)
+                        verified = True
+                    deliver(data, time.perf_counter(), "")
+        except ConnectionClosed as error:
+            code = error.rcvd.code if error.rcvd else None
+            if code == GOING_AWAY and not verified:
+                self.version = self.version - 1 or NEWEST
+            self._connection_trouble = f"{url} closed the connection ({code}); trying again"
+        except (OSError, WebSocketException) as error:
+            self._connection_trouble = (
+                f"no answer at {url} ({_short(error)}); is the Ultraleap service running, with "
+                "UltraleapTrackingWebSocket beside it if it is newer than Orion?"
+            )
+
+    def _messages(self, connection: Any) -> Iterator[bytes]:
+        while not self._closing.is_set():
+            try:
+                message = connection.recv(timeout=LOOK)
+            except TimeoutError:
+                continue
+            yield message.encode() if isinstance(message, str) else message
+
+    def _ask(self, connection: Any) -> None:
+        self._connection_trouble = ""
+        for setting in SETTINGS:
+            connection.send(json.dumps(setting))
+
+
+def _short(error: Exception) -> str:
+    text = " ".join(str(error).split()) or type(error).__name__
+    return text if len(text) <= 80 else text[:77] + "..."
+
+
+def open_device(address: SplitResult) -> LiveStream:
+    """Open ``leap+ws://HOST:PORT?hands=both``; of one hand, "left" or "right", alone if asked so.
+
+    Raises:
+        InputError: the address is wrong, or the library for WebSockets is not installed.
+    """
+    host, port = host_and_port(address, PORT)
+    options = options_of(address, {"hands": one_of(BOTH, "left", "right")})
+    decoder = LeapDecoder(options.get("hands", BOTH))
+    return LiveStream(LeapWebSocket(host, port, lambda: decoder.trouble), lambda: decoder)

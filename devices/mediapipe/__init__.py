@@ -1,0 +1,1 @@
+"""MediaPipe landmarks, from a webcam or another program: `mediapipe://`."""

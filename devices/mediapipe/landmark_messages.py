@@ -1,0 +1,232 @@
+"""MediaPipe's landmarks as JSON, one message a frame; `docs/devices-cameras.md` has the format.
+
+The lists carry the names that MediaPipe's own results have. World landmarks have their origin
+between the hips and so lose where the body is; where the image's landmarks and size come too, the
+camera's view tells, and the body walks and jumps. The first place seen is the origin then.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from devices.bodies.body_numbers import BodyNumbers
+from devices.bodies.camera_position import camera_position
+from devices.mediapipe.joints import (
+    HAND_LANDMARKS,
+    MIDDLES,
+    PARENTS,
+    POSE_LANDMARKS,
+    SIDES,
+    landmark_skeleton,
+    landmarks_to_world,
+)
+from devices.skeleton import Skeleton, SkeletonFrame
+from devices.transport.clock_map import ClockMap
+
+Array = NDArray[np.float64]
+# Landmarks are (N, 4): x, y, z and confidence in [0, 1]; NaN, NaN, NaN, 0 where there is none.
+
+MOST_BYTES = 65536
+MOST_PEOPLE = 16
+FURTHEST = 100.0  # [m], or images
+USUAL_VIEW = 60.0  # [degrees] that a webcam sees from left to right
+MOST_PIXELS = 1e5
+_FINGERTIPS = {f"{side}_{finger}" for side in SIDES for finger in ("thumb", "index", "pinky")}
+_HANDS = {f"{side}_{name}" for side in SIDES for name in HAND_LANDMARKS[1:]}
+_POSE_ROW = {name: row for row, name in enumerate(POSE_LANDMARKS)}
+
+
+class LandmarkDecoder:
+    """Frames of everyone in a message.
+
+    Args:
+        hands: whether the skeleton has MediaPipe's hands, 21 points each, instead of the three
+            fingertips that its pose has.
+        view: [degrees] that the camera sees from left to right.
+
+    Attributes:
+        refused: how many messages, or people in them, were none.
+    """
+
+    def __init__(self, *, hands: bool = False, view: float = USUAL_VIEW) -> None:
+        self.refused = 0
+        self._skeleton = landmark_skeleton(set(PARENTS) - (_FINGERTIPS if hands else _HANDS))
+        self._columns = {name: column for column, name in enumerate(self._skeleton.names)}
+        self._focal = 0.5 / math.tan(math.radians(0.5 * view))  # in widths of the image
+        self._clock = ClockMap()
+        self._numbers = BodyNumbers()
+        self._origin: Array | None = None
+        self._places: dict[int, Array] = {}
+
+    @property
+    def skeleton(self) -> Skeleton:
+        """MediaPipe's joints, with a middle of the hips and one of the shoulders."""
+        return self._skeleton
+
+    def feed(self, data: bytes, arrival: float) -> Sequence[SkeletonFrame]:
+        """A frame of each person in the message `data` that came at `arrival` [s]."""
+        message = _message(data)
+        people = _people(message.get("pose_world_landmarks"), len(POSE_LANDMARKS))
+        if people is None:
+            self.refused += 1
+            return []
+        self.refused += sum(person is None for person in people)
+        stamp = _number(message.get("timestamp_ms"))
+        time = self._clock.host_time(arrival if stamp is None else stamp * 1e-3, arrival)
+        ids = _ids(message.get("ids"), len(people))
+        bodies = {
+            ids[row]: (person, self._extras(message, row))
+            for row, person in enumerate(people)
+            if person is not None
+        }
+        places = {body: self._place(*bodies[body], message, body) for body in bodies}
+        numbers = self._numbers(places)
+        return [
+            _frame(self._joints(person, extras), places[body], numbers[body], (time, arrival))
+            for body, (person, extras) in bodies.items()
+        ]
+
+    def _extras(self, message: Mapping[str, Any], row: int) -> dict[str, Array]:
+        """What else the message says of the person in `row`: image and hands, where they are."""
+        found = {}
+        for name, count in (
+            ("pose_landmarks", len(POSE_LANDMARKS)),
+            *((f"{side}_hand_world_landmarks", len(HAND_LANDMARKS)) for side in SIDES),
+        ):
+            people = _people(message.get(name), count) or []
+            if row < len(people) and (landmarks := people[row]) is not None:
+                found[name] = landmarks
+        return found
+
+    def _place(
+        self, world: Array, extras: Mapping[str, Array], message: Mapping[str, Any], body: int
+    ) -> Array:
+        """(3,) [m, MediaPipe's axes] of the hips from where hips were seen first.
+
+        Where the image does not tell, the body stays where it was.
+        """
+        size, image = _size(message.get("image_size")), extras.get("pose_landmarks")
+        if size is not None and image is not None:
+            picture = (image[:, :2] - 0.5) * size
+            weights = np.minimum(world[:, 3], image[:, 3])
+            seen = camera_position(world[:, :3], picture, weights, self._focal * size[0])
+            if seen is not None:
+                self._origin = seen if self._origin is None else self._origin
+                if body not in self._places and len(self._places) >= MOST_PEOPLE:
+                    self._places.clear()
+                self._places[body] = seen - self._origin
+        return self._places.get(body, np.zeros(3))
+
+    def _joints(self, world: Array, extras: Mapping[str, Array]) -> Array:
+        """(J, 4) the skeleton's joints, from the middle of the hips."""
+        table = np.full((len(self._columns), 4), (np.nan, np.nan, np.nan, 0.0))
+        for name, row in _POSE_ROW.items():
+            if name in self._columns:
+                table[self._columns[name]] = world[row]
+        for middle, (left, right) in MIDDLES.items():
+            ends = table[[self._columns[left], self._columns[right]]]
+            table[self._columns[middle]] = [*ends[:, :3].mean(axis=0), ends[:, 3].min()]
+        for side in SIDES:
+            hand = extras.get(f"{side}_hand_world_landmarks")
+            if hand is not None and f"{side}_{HAND_LANDMARKS[1]}" in self._columns:
+                self._add_hand(table, side, hand)
+        return table
+
+    def _add_hand(self, table: Array, side: str, hand: Array) -> None:
+        """A hand's own landmarks [m], whose origin is in the hand, put on at the body's wrist."""
+        wrist = table[self._columns[f"{side}_wrist"]]
+        for row, name in enumerate(HAND_LANDMARKS[1:], 1):
+            place = wrist[:3] + hand[row, :3] - hand[0, :3]
+            # MediaPipe fills in no visibility of a hand's points; a hand that is there is seen.
+            table[self._columns[f"{side}_{name}"]] = [*place, wrist[3]]
+
+
+def _frame(joints: Array, place: Array, number: int, times: tuple[float, float]) -> SkeletonFrame:
+    """A frame of joints (J, 4) from the hips that are at `place`; its time and arrival [s]."""
+    seen = (joints[:, 3] > 0.0) & np.isfinite(joints).all(axis=1)
+    return SkeletonFrame(
+        time=times[0],
+        positions=landmarks_to_world(np.where(seen[:, None], joints[:, :3] + place, np.nan)),
+        rotations=None,
+        confidence=np.where(seen, joints[:, 3], 0.0),
+        performer=number,
+        arrival=times[1],
+    )
+
+
+def _message(data: bytes) -> dict[str, Any]:
+    if len(data) > MOST_BYTES:
+        return {}
+    try:
+        message = json.loads(data)
+    except (ValueError, RecursionError):
+        return {}
+    return message if isinstance(message, dict) else {}
+
+
+def _people(value: Any, count: int) -> list[Array | None] | None:
+    """Landmarks (count, 4) of each person, None for one that has none; None if it is no list.
+
+    The list of one person alone, as MediaPipe's holistic model gives it, is a list of one.
+    """
+    if not isinstance(value, list) or len(value) > max(MOST_PEOPLE, count):
+        return None
+    if value and (isinstance(value[0], dict) or _is_landmark(value[0])):
+        value = [value]
+    return [_landmarks(person, count) for person in value[:MOST_PEOPLE]]
+
+
+def _is_landmark(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and _number(value[0]) is not None
+
+
+def _landmarks(value: Any, count: int) -> Array | None:
+    if not isinstance(value, list) or len(value) != count:
+        return None
+    return np.array([_landmark(landmark) for landmark in value])
+
+
+def _landmark(value: Any) -> tuple[float, float, float, float]:
+    """x, y, z and visibility of [x, y, z], [x, y, z, visibility ...] or {"x": ...}; 1 if it is not
+    told how visible it is."""
+    if isinstance(value, dict):
+        value = [value.get(key) for key in ("x", "y", "z", "visibility")]
+        value = value[:3] if value[3] is None else value
+    numbers = [_number(item) for item in value[:4]] if isinstance(value, list) else []
+    x, y, z, visibility = (*numbers, 1.0)[:4] if len(numbers) >= 3 else (None,) * 4
+    if x is None or y is None or z is None or visibility is None:
+        return (math.nan, math.nan, math.nan, 0.0)
+    if max(abs(x), abs(y), abs(z)) > FURTHEST:
+        return (math.nan, math.nan, math.nan, 0.0)
+    return (x, y, z, min(max(visibility, 0.0), 1.0))
+
+
+def _number(value: Any) -> float | None:
+    if not isinstance(value, int | float) or isinstance(value, bool) or not abs(value) < 1e15:
+        return None
+    return float(value)
+
+
+def _size(value: Any) -> tuple[float, float] | None:
+    """Width and height [pixels] of the image, or None."""
+    if not isinstance(value, list) or len(value) != 2:
+        return None
+    width, height = _number(value[0]), _number(value[1])
+    if width is None or height is None or not min(width, height) >= 1.0:
+        return None
+    return (width, height) if max(width, height) <= MOST_PIXELS else None
+
+
+def _ids(value: Any, count: int) -> list[int]:
+    """Who each person is, as the sender says; else by the place in the list."""
+    if isinstance(value, list) and len(value) == count and len({*map(str, value)}) == count:
+        numbers = [_number(item) for item in value]
+        if all(number is not None and number == int(number) for number in numbers):
+            return [int(number) for number in numbers if number is not None]
+    return list(range(count))

@@ -1,0 +1,129 @@
+"""Bodies that came without axes, units or a floor that can be trusted, put upright in ours.
+
+Who is before a depth camera faces it: its programs take that for granted when they call a hand the
+left one. So where a program does not say whether it mirrors, or which way its pictures run, the
+first poses tell. Where it does not say its unit, the torso gets the length of the built-in body's.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from devices.kinect.joints import KINECT_V2
+from devices.osc.joint_messages import JointFormat
+from devices.osc.openni_joints import OPENNI
+
+Array = NDArray[np.float64]
+
+MOST_SIZES = 60  # frames over which a torso is measured; then its length stays
+LEAST_TORSO = 1e-6  # units
+FARTHEST = 1000.0  # [m] or a position is not believed
+_FEET = 150  # heights of lowest joints that are remembered
+_STANDING = 5.0  # percentile of them that is the floor: below it feet were tracked badly
+_STUBBORN = 100.0  # torsos: how much of the other side is needed to be believed later
+
+_HIPS, _NECK = KINECT_V2.index("SpineBase"), KINECT_V2.index("SpineShoulder")
+_PAIRS = np.array(
+    [
+        [KINECT_V2.index(f"{joint}{side}") for side in ("Left", "Right")]
+        for joint in ("Shoulder", "Hip")
+    ]
+)
+_HIP_PAIR = _PAIRS[1]
+_TORSO = float(
+    np.linalg.norm(
+        OPENNI.rest_positions[OPENNI.index("Neck")] - OPENNI.rest_positions[OPENNI.index("Pelvis")]
+    )
+)
+_TURNED = np.array([-1.0, 1.0, -1.0])  # half a turn about Y: whoever faces the sensor faces +Z
+
+# OSCeleton maps 2.56 m and 1.92 m before the camera, and 1.28 m of depth, to 1; y downwards.
+_UNIT = np.array([2.56, -1.92, 1.28])
+_MIDDLE = np.array([0.5, 0.5, 0.0])
+_RAW = 20.0  # no depth is so large but in OSCeleton's raw mode, which has millimetres
+
+
+class CameraBody:
+    """One body as a camera's program tells of it.
+
+    Args:
+        scale: [m] of the program's unit; None to go by the torso.
+    """
+
+    def __init__(self, scale: float | None = None) -> None:
+        self._scale = scale
+        self._sizes: list[float] = []
+        self._ratio = 1.0  # [m] of the unit, by the torso
+        self._left = self._up = 0.0  # torsos that left was at +x, and up at +y, summed up
+        self._lowest: list[float] = []
+
+    def place(self, positions: Array, told: JointFormat) -> Array:
+        """(25, 3) [m] Kinect's joints in our axes, upright on the floor, of those that were sent.
+
+        Args:
+            positions: (25, 3) as sent; NaN where not seen.
+            told: whose axes they are.
+        """
+        placed = _in_our_axes(positions, told)
+        if np.isnan(placed[_HIPS]).any():
+            placed[_HIPS] = placed[_HIP_PAIR].mean(axis=0)
+        torso = _neck(placed) - placed[_HIPS]
+        length = float(np.nan_to_num(np.linalg.norm(torso)))
+        if length > LEAST_TORSO and told in (JointFormat.OSCELETON, JointFormat.ANIMATA):
+            self._put_left_left(placed, length)
+        if length > LEAST_TORSO and told is JointFormat.ANIMATA:
+            self._put_upright(placed, torso[1] / length)
+        placed[:, 1] -= self._floor(placed)
+        placed *= self._unit(length, told)
+        placed[~(np.abs(placed) < FARTHEST).all(axis=1)] = np.nan  # NaN is not less
+        return placed
+
+    def _put_left_left(self, placed: Array, length: float) -> None:
+        """Reflect, in place, who is mirrored; `length` of the torso."""
+        side = float(np.nansum(placed[_PAIRS[:, 0], 0] - placed[_PAIRS[:, 1], 0])) / length
+        self._left = float(np.clip(self._left + side, -_STUBBORN, _STUBBORN))
+        if self._left < 0.0:
+            placed[:, 0] *= -1.0
+
+    def _put_upright(self, placed: Array, rise: float) -> None:
+        """Reflect, in place, who is upside down; `rise` is the torso's, of its length."""
+        self._up = float(np.clip(self._up + rise, -_STUBBORN, _STUBBORN))
+        if self._up < 0.0:
+            placed[:, 1] *= -1.0
+
+    def _unit(self, torso: float, told: JointFormat) -> float:
+        if told is JointFormat.KINECT and self._scale is None:
+            return 1.0
+        if self._scale is not None:
+            return self._scale
+        if torso > LEAST_TORSO and len(self._sizes) < MOST_SIZES:
+            self._sizes.append(torso)
+            self._ratio = _TORSO / float(np.median(self._sizes))
+        return self._ratio
+
+    def _floor(self, placed: Array) -> float:
+        """How high the floor is: where the lowest joint was, most of the time."""
+        heights = placed[~np.isnan(placed[:, 1]), 1]
+        if len(heights):
+            self._lowest = [*self._lowest[-_FEET + 1 :], float(heights.min())]
+        return float(np.percentile(self._lowest, _STANDING)) if self._lowest else 0.0
+
+
+def _in_our_axes(positions: Array, told: JointFormat) -> Array:
+    if told is JointFormat.ANIMATA:
+        return positions.copy()
+    if told is not JointFormat.OSCELETON:
+        turned: Array = positions * _TURNED
+        return turned
+    raw = (np.abs(positions[:, 2]) > _RAW).any()
+    metres = positions * 1e-3 if raw else (positions - _MIDDLE) * _UNIT
+    seen: Array = metres * _TURNED
+    return seen
+
+
+def _neck(placed: Array) -> Array:
+    """(3,) the middle of the shoulders; NaN where it is not seen."""
+    neck = placed[_NECK]
+    between: Array = placed[_PAIRS[0]].mean(axis=0) if np.isnan(neck).any() else neck
+    return between

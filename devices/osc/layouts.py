@@ -1,0 +1,88 @@
+"""Packets that differ in their numbers only, as those of a sender do from frame to frame.
+
+Sizes, addresses, type tags and texts decide what an OSC packet holds. Where all of those are, byte
+for byte, as in a packet that was read strictly before, it has the same messages with other numbers,
+and need not be read again.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from devices.compiled import kernel
+from devices.osc.messages import BUNDLE, Message, numbers_at_end
+
+Bytes = NDArray[np.uint8]
+Span = tuple[int, int]
+Plan = TypeVar("Plan")
+
+MOST_LENGTHS = 16
+MOST_A_LENGTH = 4
+_TIME_TAG = slice(8, 16)  # of the outer bundle
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Layout(Generic[Plan]):
+    """Bits (N,) that stay, those bits, and what the packet's reader made of them."""
+
+    mask: Bytes
+    pattern: Bytes
+    plan: Plan
+
+
+class Layouts(Generic[Plan]):
+    """The layouts of the packets of one sender, so many of them as a sender has in one frame."""
+
+    def __init__(self) -> None:
+        self._by_length: dict[int, deque[_Layout[Plan]]] = {}
+        nothing = np.zeros(0, dtype=np.uint8)
+        _same(np.frombuffer(b"", np.uint8), nothing, nothing)  # compiled before the first packet
+
+    def find(self, data: bytes) -> Plan | None:
+        """What was learned of a packet that differs in its numbers only; None if there is none."""
+        known = self._by_length.get(len(data))
+        if known is None:
+            return None
+        there = np.frombuffer(data, np.uint8)
+        for layout in known:
+            if _same(there, layout.mask, layout.pattern):
+                return layout.plan
+        return None
+
+    def learn(self, data: bytes, said: Iterable[tuple[Span, Message]], plan: Plan) -> None:
+        """Remember what to make of a packet, whatever the numbers at the ends of its messages are.
+
+        Args:
+            data: a packet that was read and is well-formed.
+            said: its messages, and where each begins and ends.
+            plan: what `find` is to return; the same for any numbers.
+        """
+        mask = np.full(len(data), 255, dtype=np.uint8)
+        if data.startswith(BUNDLE):
+            mask[_TIME_TAG] = 0
+        for (_, end), message in said:
+            mask[end - numbers_at_end(message.tags) : end] = 0
+        there = np.frombuffer(data, np.uint8)
+        layout = _Layout(mask, there & mask, plan)
+        if len(data) not in self._by_length and len(self._by_length) == MOST_LENGTHS:
+            del self._by_length[next(iter(self._by_length))]
+        self._by_length.setdefault(len(data), deque(maxlen=MOST_A_LENGTH)).append(layout)
+
+    def clear(self) -> None:
+        """Know none."""
+        self._by_length.clear()
+
+
+@kernel
+def _same(data: Bytes, mask: Bytes, pattern: Bytes) -> bool:
+    """Whether packets (N,) agree in the bits of a mask."""
+    other = np.uint8(0)
+    for place in range(len(data)):
+        other |= (data[place] & mask[place]) ^ pattern[place]
+    return bool(other == 0)

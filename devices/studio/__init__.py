@@ -1,0 +1,1 @@
+"""Motion-capture suits: Rokoko Studio and Xsens MVN."""

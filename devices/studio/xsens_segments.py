@@ -1,0 +1,67 @@
+"""The segments of Xsens MVN's body: names and order of the protocol, parents, and its T-pose.
+
+A joint is a segment's origin, which is where it hangs on the one before. Source: MVN real-time
+network streaming protocol specification, tables 1 and 2 (segments, finger tracking segments). The
+protocol tells of no lengths beforehand; those of the built-in body stand in for them at rest.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+from devices.bodies.humanoid_points import Point, at, skeleton_on_humanoid
+from devices.skeleton import Skeleton
+
+BODY = 23
+FINGERS_A_HAND = 20
+
+_TRUNK: dict[str, Point] = {
+    "Pelvis": at("", "Hips"),
+    "L5": at("Pelvis", "Spine"),
+    "L3": ("L5", "Spine", "Chest", 0.5),
+    "T12": ("L3", "Chest", "UpperChest", 0.3),
+    "T8": at("T12", "UpperChest"),
+    "Neck": at("T8", "Neck"),
+    "Head": at("Neck", "Head"),
+}
+_ARM = {"Shoulder": "Shoulder", "UpperArm": "UpperArm", "ForeArm": "LowerArm", "Hand": "Hand"}
+_LEG = {"UpperLeg": "UpperLeg", "LowerLeg": "LowerLeg", "Foot": "Foot", "Toe": "Toes"}
+_CARPUS = 0.2  # of the way from the wrist to the middle finger's knuckle
+_METACARPAL = 0.35  # of the way from the wrist to a finger's knuckle
+
+
+@lru_cache(maxsize=2)
+def xsens_skeleton(*, fingers: bool = False) -> Skeleton:
+    """The 23 segments of the body at rest in a T-pose; with `fingers` the 20 of each hand as well.
+
+    Joints are in the order in which MVN numbers segments, left fingers before right ones.
+    """
+    points = dict(_TRUNK)
+    for hung_on, limb in (("T8", _ARM), ("Pelvis", _LEG)):
+        for side in ("Right", "Left"):
+            parent = hung_on
+            for name, bone in limb.items():
+                points[side + name] = at(parent, side + bone)
+                parent = side + name
+    for side in ("Left", "Right") if fingers else ():
+        points |= _hand(side)
+    return skeleton_on_humanoid(points)
+
+
+def _hand(side: str) -> dict[str, Point]:
+    """The segments of one hand; a thumb has no middle phalanx, its first bone is a metacarpal."""
+    wrist, carpus = f"{side}Hand", f"{side}Carpus"
+    points = {
+        carpus: (wrist, wrist, f"{side}MiddleProximal", _CARPUS),
+        f"{side}ThumbMetacarpal": at(carpus, f"{side}ThumbProximal"),
+        f"{side}ThumbProximal": at(f"{side}ThumbMetacarpal", f"{side}ThumbIntermediate"),
+        f"{side}ThumbDistal": at(f"{side}ThumbProximal", f"{side}ThumbDistal"),
+    }
+    for finger in ("Index", "Middle", "Ring", "Little"):
+        above = f"{side}{finger}Metacarpal"
+        points[above] = (carpus, wrist, f"{side}{finger}Proximal", _METACARPAL)
+        for segment in ("Proximal", "Intermediate", "Distal"):
+            name = f"{side}{finger}{segment}"
+            points[name] = at(above, name)
+            above = name
+    return points

@@ -1,0 +1,1 @@
+"""How bytes arrive: sockets, reader threads, clocks and bounded queues."""

@@ -1,0 +1,204 @@
+"""BVH motion capture files as recordings: what the format leaves open is guessed and noted."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from devices.bodies.anatomy import hips_joint, label_joints
+from devices.errors import InputError
+from devices.skeleton import Skeleton
+from replay.bvh.motion import forward_kinematics, rest_positions
+from replay.bvh.text import BvhJoint, read_bvh_text
+from replay.orientation import (
+    body_height,
+    floor_and_start,
+    legs_hang,
+    stands_upright,
+    up_axis,
+    up_to_y,
+    yaw_to_front,
+)
+from replay.recording import Recording
+
+Array = NDArray[np.float64]
+
+_UNITS = (  # name, metres, the heights [m] of a person in the file for which it is believed
+    ("metres", 1.0, (1.2, 2.5)),
+    ("centimetres", 0.01, (1.2, 2.5)),
+    ("millimetres", 0.001, (1.2, 2.5)),
+    ("inches", 0.0254, (1.4, 2.1)),
+    ("decimetres", 0.1, (1.4, 2.1)),
+    ("CMU units of 1/0.45 inch", 0.0254 / 0.45, (1.3, 2.1)),
+)
+_USUAL_HEIGHT = 1.7  # [m] of a person whose unit is none of these
+_CREATURE_SIZES = (0.3, 10.0)  # [m] believed of what is not a person
+
+
+def recognises_bvh(path: Path, head: bytes) -> bool:
+    """Whether the file begins with HIERARCHY, or at least is called .bvh."""
+    start = head.replace(b"\x00", b"").lstrip(b"\xef\xbb\xbf\xff\xfe \t\r\n")
+    return start[:9].upper() == b"HIERARCHY" or path.suffix.lower() == ".bvh"
+
+
+def read_bvh(path: Path) -> Recording:
+    """Read a BVH file: joints in metres, +Y up, facing +Z, from the file's free units and axes.
+
+    Rotations are joint to world and identity for the file's zero pose, up to the turn of the whole
+    recording. End sites become joints named after their parent with "_end". Rest positions are the
+    zero pose, upright by itself, or the first frame where the zero pose is no pose at all. Several
+    roots are joined under one. Unit, up axis and heading are guessed from the body (see
+    `replay.orientation`), and noted.
+
+    Raises:
+        InputError: not a BVH file, or one that cannot be understood; with the line.
+    """
+    text = read_bvh_text(path)
+    notes = list(text.notes)
+    positions, rotations = forward_kinematics(text)
+    rest = rest_positions(text.joints)
+    names = _unique_names(text.joints, notes)
+    parents = [joint.parent for joint in text.joints]
+    if parents.count(-1) > 1:
+        notes.append(f"{parents.count(-1)} roots, joined under one")
+        positions, rotations, rest = _under_one_root(parents, positions, rotations, rest)
+        names = [_free_name("root", names), *names]
+        parents = [-1, *(parent + 1 for parent in parents)]
+    skeleton = Skeleton(tuple(names), np.array(parents), rest)
+    positions, rotations, rest = _canonical(skeleton, positions, rotations, notes)
+    seen = np.isfinite(positions).all(axis=2)
+    if not seen.any():
+        raise InputError(f"{path}: no joint has a usable position in any frame")
+    positions[~seen] = np.nan
+    frames = len(positions)
+    return Recording(
+        skeleton=Skeleton(skeleton.names, skeleton.parents, rest),
+        times=np.arange(frames, dtype=np.float64) * text.frame_time,
+        positions=positions,
+        rotations=rotations,
+        confidence=np.where(seen, 1.0, 0.0),
+        performers=np.zeros(frames, dtype=np.int64),
+        arrivals=np.full(frames, np.nan),
+        notes=tuple(notes),
+    )
+
+
+def _unique_names(joints: list[BvhJoint], notes: list[str]) -> list[str]:
+    """Every joint's name, end sites named after their parents, repeated ones numbered."""
+    taken = {joint.name for joint in joints if joint.name}
+    given: Counter[str] = Counter()
+    names: list[str] = []
+    for joint in joints:
+        name = joint.name or (f"{names[joint.parent]}_end" if joint.parent >= 0 else "end")
+        if given[name] or (not joint.name and name in taken):
+            number = given[name] + 1
+            while f"{name}_{number}" in taken:
+                number += 1
+            given[name] = number
+            name = f"{name}_{number}"
+        given[name] += 1
+        taken.add(name)
+        names.append(name)
+    repeated = len(joints) - len({joint.name for joint in joints if joint.name})
+    repeated -= sum(not joint.name for joint in joints)
+    if repeated:
+        notes.append(f"{repeated} joint names repeat and were numbered")
+    return names
+
+
+def _free_name(name: str, names: list[str]) -> str:
+    while name in names:
+        name = f"{name}_all"
+    return name
+
+
+def _under_one_root(
+    parents: list[int], positions: Array, rotations: Array, rest: Array
+) -> tuple[Array, Array, Array]:
+    """The same with a joint put first, unturned, in the middle of the roots."""
+    roots = np.flatnonzero(np.array(parents) == -1)
+    middle = positions[:, roots].mean(axis=1, keepdims=True)
+    unturned = np.tile([0.0, 0.0, 0.0, 1.0], (len(positions), 1, 1))
+    return (
+        np.concatenate([middle, positions], axis=1),
+        np.concatenate([unturned, rotations], axis=1),
+        np.concatenate([rest[roots].mean(axis=0, keepdims=True), rest]),
+    )
+
+
+def _canonical(
+    skeleton: Skeleton, positions: Array, rotations: Array, notes: list[str]
+) -> tuple[Array, Array, Array]:
+    """Positions, rotations and rest positions in metres, +Y up, facing +Z, on the floor."""
+    parts = label_joints(skeleton)
+    rest = skeleton.rest_positions
+    up = up_axis(skeleton, parts, positions, rest)
+    if up is None:
+        up = np.array([0.0, 1.0, 0.0])
+        notes.append("up axis taken as +Y: no legs or head known by name")
+    elif up[1] != 1.0:
+        notes.append(f"up axis is {'-+'[int(up.sum() > 0)]}{'XYZ'[int(np.argmax(np.abs(up)))]}")
+    person = stands_upright(skeleton, parts, positions, up)
+    height = body_height(skeleton, parts, rest) if person else None
+    size = float(np.ptp(rest, axis=0).max())
+    scale = _metres(height, size, notes)
+    turn = up_to_y(up)
+    moved = positions @ (scale * turn.T)
+    yaw = yaw_to_front(skeleton, moved)
+    if yaw is None:
+        notes.append("heading left as it is: no left and right hips or shoulders known by name")
+    else:
+        moved, turn = moved @ yaw.T, yaw @ turn
+    moved -= floor_and_start(moved, hips_joint(skeleton))
+    return moved, _turned(rotations, turn), _rest(skeleton, scale, moved, notes)
+
+
+def _metres(height: float | None, size: float, notes: list[str]) -> float:
+    """Metres of the file's unit, from a person's height in it, else from the skeleton's size."""
+    if height is None or height <= 0:
+        for unit, metres, _ in _UNITS[:3]:
+            if _CREATURE_SIZES[0] <= size * metres <= _CREATURE_SIZES[1]:
+                notes.append(f"unit guessed: {unit}, {size * metres:.2f} m long")
+                return metres
+        notes.append(f"unit unknown, scaled to {_USUAL_HEIGHT} m")
+        return _USUAL_HEIGHT / size if size > 0 else 1.0
+    for unit, metres, (least, most) in _UNITS:
+        if least <= height * metres <= most:
+            notes.append(f"unit guessed: {unit}, {height * metres:.2f} m tall")
+            return metres
+    notes.append(f"unit unknown, scaled to a height of {_USUAL_HEIGHT} m")
+    return _USUAL_HEIGHT / height
+
+
+def _turned(rotations: Array, turn: Array) -> Array:
+    """Rotations (T, J, 4) with `turn` (3, 3) applied after them; NaN stays NaN."""
+    flat = rotations.reshape(-1, 4)
+    known = np.isfinite(flat).all(axis=1)
+    out = np.full_like(flat, np.nan)
+    if known.any():
+        out[known] = (Rotation.from_matrix(turn) * Rotation.from_quat(flat[known])).as_quat()
+    return out.reshape(rotations.shape)
+
+
+def _rest(skeleton: Skeleton, scale: float, moved: Array, notes: list[str]) -> Array:
+    """The zero pose made canonical by itself; the first whole frame where it does not stand."""
+    parts = label_joints(skeleton)
+    y = np.array([0.0, 1.0, 0.0])
+    rest = skeleton.rest_positions * scale
+    up = up_axis(skeleton, parts, rest[None], rest)
+    if up is not None:
+        rest = rest @ up_to_y(up).T
+        stands = stands_upright(skeleton, parts, rest[None], y) and legs_hang(
+            skeleton, parts, rest, y
+        )
+        whole = np.isfinite(moved).all(axis=(1, 2))
+        if not stands and stands_upright(skeleton, parts, moved, y) and whole.any():
+            notes.append("the zero pose does not stand; the first frame serves as rest pose")
+            rest = moved[int(np.argmax(whole))]
+    yaw = yaw_to_front(skeleton, rest[None])
+    rest = rest if yaw is None else rest @ yaw.T
+    return rest - floor_and_start(rest[None], hips_joint(skeleton))

@@ -1,0 +1,1 @@
+"""Recorded Kinect bodies in the text formats of public data sets."""

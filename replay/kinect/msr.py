@@ -1,0 +1,67 @@
+"""MSR Action3D skeleton files: Kinect v1, 20 lines a frame of "x y z confidence", camera metres.
+
+Source: Li, Zhang, Liu 2010, "Action Recognition Based on a Bag of 3D Points"; the files in
+real-world coordinates. The joints come in an order of their own, not that of the Kinect SDK. It was
+read off the poses: the moving arm of the one-armed actions, which the subjects were told to do with
+the right one, is 2-9-11-13 counted from 1, feet are nearer to the camera than ankles.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from devices.kinect.joints import KINECT_TO_WORLD, KINECT_V1
+from replay.kinect.files import (
+    are_numbers,
+    camera_recording,
+    first_rows,
+    number_rows,
+    read_lines,
+)
+from replay.recording import Recording
+
+_ORDER = (
+    *("ShoulderLeft", "ShoulderRight", "ShoulderCenter", "Spine", "HipLeft", "HipRight"),
+    *("HipCenter", "ElbowLeft", "ElbowRight", "WristLeft", "WristRight", "HandLeft", "HandRight"),
+    *("KneeLeft", "KneeRight", "AnkleLeft", "AnkleRight", "FootLeft", "FootRight", "Head"),
+)
+_RATE = 15.0  # [Hz] the data set's; its files have no time
+
+
+def recognises_msr(_path: Path, head: bytes) -> bool:
+    """Whether the file has lines of four numbers, the last a confidence."""
+    rows = first_rows(head, None)
+    return len(rows) >= len(_ORDER) and all(
+        len(row) == 4 and are_numbers(row) and 0 <= float(row[3]) <= 1 for row in rows
+    )
+
+
+def read_msr(path: Path) -> Recording:
+    """Read an MSR Action3D file, every frame, at 15 frames a second.
+
+    Its confidence is how visible the joint was: 0 marks a joint that the tracker inferred, as it
+    always does along the spine, and maps to 0.5, what Kinect's "inferred" means elsewhere; 1 to 1.
+
+    Raises:
+        InputError: see `replay.kinect.files.number_rows`.
+    """
+    notes: list[str] = ["no times in the file: 15 frames a second"]
+    rows = number_rows(path, read_lines(path), 4, notes)
+    joints = len(_ORDER)
+    frames = len(rows) // joints
+    if len(rows) % joints:
+        notes.append("the last frame is cut and was left out")
+    table = rows[: frames * joints].reshape(frames, joints, 4)
+    table = table[:, [_ORDER.index(name) for name in KINECT_V1.names]]
+    visible = np.clip(np.nan_to_num(table[..., 3]), 0.0, 1.0)
+    return camera_recording(
+        path,
+        KINECT_V1,
+        KINECT_TO_WORLD,
+        times=np.arange(frames, dtype=np.float64) / _RATE,
+        positions=table[..., :3],
+        confidence=0.5 + 0.5 * visible,
+        notes=notes,
+    )

@@ -1,0 +1,1 @@
+"""Bunraku's own recordings: MCAP files that survive a crash."""

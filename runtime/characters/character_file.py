@@ -1,0 +1,146 @@
+"""Characters from files: read, welded, put on the stage, with a skeleton in every case."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from devices.errors import InputError
+from devices.skeleton import Skeleton
+from runtime.characters.builtin import BUILTIN
+from runtime.characters.cache import cached_skeleton
+from runtime.characters.character import Character, Surface
+from runtime.characters.formats.mesh_data import FileMesh, MeshError
+from runtime.characters.formats.mesh_file import MESH_SUFFIXES, checked, read_mesh_file
+from runtime.characters.gltf.rig import read_gltf
+from runtime.characters.palette import palette_color
+from runtime.characters.placement import (
+    ABOUT_FACE,
+    UPRIGHT,
+    guess_rotation,
+    placed,
+    placement_matrix,
+)
+from runtime.characters.weld import first_occurrences, weld, welded_weights
+
+RIG_SUFFIXES = (".glb", ".gltf", ".vrm")
+SUFFIXES = MESH_SUFFIXES + RIG_SUFFIXES
+
+
+def read_character(path: Path) -> Character:
+    """The character in a mesh or rig file, on the stage, with its rig or an extracted skeleton.
+
+    Raises:
+        InputError: there is no such file, its format is not known, or it holds no usable surface.
+    """
+    if path.suffix.lower() not in SUFFIXES:
+        raise InputError(
+            f"{path}: no character is read from {path.suffix or 'a file without a suffix'}; use "
+            f"{', '.join(SUFFIXES)}, or a built-in one: {', '.join(BUILTIN)}"
+        )
+    if not path.exists():
+        raise InputError(
+            f"{path}: there is no such file; built-in characters are {', '.join(BUILTIN)}"
+        )
+    return _from_rig(path) if path.suffix.lower() in RIG_SUFFIXES else _from_mesh(path)
+
+
+def _from_mesh(path: Path) -> Character:
+    mesh = read_mesh_file(path)
+    vertex = weld(mesh.vertices)
+    rotation, guesses = guess_rotation(mesh.vertices[first_occurrences(vertex)], vertex[mesh.faces])
+    return _standing(path, replace(mesh, notes=mesh.notes + guesses), vertex, rotation)
+
+
+def _from_rig(path: Path) -> Character:
+    """glTF says which way is up, VRM which way is forward: nothing to guess."""
+    model = read_gltf(path)
+    mesh = FileMesh(
+        model.file_vertices,
+        model.faces,
+        model.colors,
+        model.uvs,
+        model.materials,
+        model.face_material,
+        model.notes,
+    )
+    try:
+        mesh = checked(mesh)
+    except MeshError as error:
+        raise InputError(f"{path}: {error}") from None
+    rotation = ABOUT_FACE if model.faces_backward else UPRIGHT
+    rig = None
+    if model.skeleton is not None and model.weights is not None:
+        rig = model.skeleton, model.weights
+    return _standing(path, mesh, weld(mesh.vertices), rotation, rig)
+
+
+def _standing(
+    path: Path,
+    mesh: FileMesh,
+    vertex: NDArray[np.int64],
+    rotation: NDArray[np.float64],
+    rig: tuple[Skeleton, csr_array] | None = None,
+) -> Character:
+    """The character on the stage; the rig's joints and weights (M, K) are the file's."""
+    welded, faces = mesh.vertices[first_occurrences(vertex)], vertex[mesh.faces]
+    placement = placement_matrix(rotation, welded[np.unique(faces)])
+    vertices = placed(placement, welded)
+    weights = None
+    if rig is None:
+        skeleton = _extracted(vertices, faces, path)
+    else:
+        joints, weights = rig[0], welded_weights(rig[1], vertex)
+        skeleton = Skeleton(joints.names, joints.parents, placed(placement, joints.rest_positions))
+    return Character(
+        name=path.stem,
+        vertices=vertices,
+        faces=faces,
+        skeleton=skeleton,
+        weights=weights,
+        surface=_surface(mesh, vertex),
+        placement=placement,
+        notes=mesh.notes,
+    )
+
+
+def _extracted(vertices: NDArray[np.float64], faces: NDArray[np.int64], path: Path) -> Skeleton:
+    from solvers.skeleton.skeletonize import VERSION, extract_skeleton  # noqa: PLC0415  (optional extras)
+
+    try:
+        parents, positions = cached_skeleton(vertices, faces, extract_skeleton, VERSION)
+    except ImportError as error:
+        raise InputError(
+            f"{path}: a skeleton for a mesh without a rig needs the extra ({error.name}): "
+            "pip install 'bunraku[characters]'"
+        ) from None
+    except OSError as error:  # PyGEL3D links libraries that a bare system lacks
+        raise InputError(
+            f"{path}: a skeleton for a mesh without a rig needs system libraries ({error}); "
+            "on Debian or Ubuntu: apt-get install libgl1 libx11-6"
+        ) from None
+    names = tuple(f"node{index}" for index in range(len(parents)))
+    return Skeleton(names, parents, positions)
+
+
+def _surface(mesh: FileMesh, vertex: NDArray[np.int64]) -> Surface:
+    colors = mesh.colors
+    if colors is None:
+        colors = np.ones((len(mesh.vertices), 4), dtype=np.float32)
+        if all(m.texture is None and (m.color == 1.0).all() for m in mesh.materials):
+            colors[:] = palette_color(mesh.vertices, mesh.faces)
+    face_material = mesh.face_material
+    if face_material is None:
+        face_material = np.zeros(len(mesh.faces), dtype=np.int64)
+    return Surface(
+        vertex=vertex,
+        faces=mesh.faces.astype(np.int32),
+        colors=colors,
+        uvs=mesh.uvs,
+        materials=mesh.materials,
+        face_material=face_material,
+    )

@@ -1,0 +1,68 @@
+"""What a mesh file holds, before it is welded and placed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from runtime.characters.character import Material
+
+MOST_VERTICES = 2_000_000
+MOST_FACES = 4_000_000
+
+
+def plain_material() -> Material:
+    """A white material without a texture: colours are the vertices' own."""
+    return Material(np.ones(4, dtype=np.float32))
+
+
+class MeshError(ValueError):
+    """What is wrong in the content of a mesh file; the reader of files adds which file."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FileMesh:
+    """A mesh in its file's own unit and axes.
+
+    Attributes:
+        vertices: (M, 3) in file order.
+        faces: (F, 3) into `vertices`.
+        colors: (M, 4) linear RGBA in [0, 1], NaN rows where unknown, or None.
+        uvs: (M, 2) as glTF has them, v downwards, or None.
+        materials: at least one.
+        face_material: (F,) into `materials`, or None: all of them are the first.
+        notes: what was left out or mended, one short line each.
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int64]
+    colors: NDArray[np.float32] | None = None
+    uvs: NDArray[np.float32] | None = None
+    materials: tuple[Material, ...] = field(default_factory=lambda: (plain_material(),))
+    face_material: NDArray[np.int64] | None = None
+    notes: tuple[str, ...] = ()
+
+
+def fan(corners: Sequence[int]) -> list[tuple[int, int, int]]:
+    """The triangles of a polygon, fanned from its first corner."""
+    return [(corners[0], corners[i], corners[i + 1]) for i in range(1, len(corners) - 1)]
+
+
+def check_counts(vertices: int, faces: int) -> None:
+    """Refuse counts that no file may declare.
+
+    Raises:
+        MeshError: there is nothing, or too much.
+    """
+    if vertices <= 0:
+        raise MeshError("it holds no vertices; export the character's mesh again")
+    if faces <= 0:
+        raise MeshError("it holds points but no faces; export it with its faces")
+    if vertices > MOST_VERTICES or faces > MOST_FACES:
+        raise MeshError(
+            f"it has {vertices} vertices and {faces} faces, more than {MOST_VERTICES} and "
+            f"{MOST_FACES}; reduce it first"
+        )

@@ -1,0 +1,97 @@
+"""OFF files in ASCII, with colours of the vertices."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+from numpy.typing import NDArray
+
+from runtime.characters.formats.mesh_data import FileMesh, MeshError, check_counts, fan
+from runtime.characters.palette import linear_from_srgb
+
+_KEYWORD = re.compile(r"(ST)?(C)?(N)?(4)?(n)?OFF\b", re.ASCII)
+
+
+def read_off(content: bytes) -> FileMesh:
+    """Read OFF, COFF, NOFF, CNOFF and STOFF; polygons are fanned into triangles, comments skipped.
+
+    Colours of vertices are taken as sRGB, whole numbers to 255 or fractions to 1; colours of faces,
+    normals and texture coordinates are left out.
+
+    Raises:
+        MeshError: what is wrong with it, and in which line of those that are not comments.
+    """
+    lines = [
+        line.split()
+        for raw in content.decode("latin-1").splitlines()
+        if (line := raw.split("#", 1)[0].strip())
+    ]
+    if not lines:
+        raise MeshError("it is empty; export the character's mesh again")
+    colored, normals, head = _header(lines)
+    count, face_count = _counts(lines, head)
+    check_counts(count, face_count)
+    if len(lines) < head + 1 + count + face_count:
+        raise MeshError(
+            f"it announces {count} vertices and {face_count} faces but ends before; it is cut short"
+        )
+    body = lines[head + 1 :]
+    vertices = _numbers(body[:count], 3)
+    skipped = 3 + 3 * normals
+    widths = {len(words) for words in body[:count]}
+    colors = None
+    if colored and min(widths) >= skipped + 3:
+        colors = _colors(_numbers(body[:count], min(*widths, skipped + 4))[:, skipped:])
+    faces = _faces(body[count : count + face_count])
+    return FileMesh(vertices, faces, colors)
+
+
+def _header(lines: list[list[str]]) -> tuple[bool, bool, int]:
+    """Whether vertices have colours, whether normals, and in which line the counts are."""
+    found = _KEYWORD.fullmatch(lines[0][0])
+    if found is None:
+        raise MeshError(f"it does not begin with OFF but with {lines[0][0][:20]!r}")
+    if found[4] or found[5]:
+        raise MeshError("it has vertices in four or more dimensions; export it in three")
+    if len(lines[0]) > 1 and lines[0][1].upper() == "BINARY":
+        raise MeshError("it is a binary OFF; export it as text")
+    rest = lines[0][1:]
+    if rest:
+        lines[0] = rest
+    return bool(found[2]), bool(found[3]), 0 if rest else 1
+
+
+def _counts(lines: list[list[str]], head: int) -> tuple[int, int]:
+    try:
+        return int(lines[head][0]), int(lines[head][1])
+    except (IndexError, ValueError):
+        raise MeshError("the counts of vertices and faces after OFF are missing") from None
+
+
+def _numbers(rows: list[list[str]], width: int) -> NDArray[np.float64]:
+    for index, row in enumerate(rows):
+        if len(row) < width:
+            raise MeshError(f"vertex {index} has {len(row)} numbers, not {width}; it is damaged")
+    try:
+        return np.array([row[:width] for row in rows], dtype=np.float64)
+    except ValueError as error:
+        raise MeshError(f"a vertex is no number ({error}); it is damaged") from None
+
+
+def _colors(values: NDArray[np.float64]) -> NDArray[np.float32]:
+    finite = values[np.isfinite(values)]
+    return linear_from_srgb(values / (255.0 if finite.size and finite.max() > 1.0 else 1.0))
+
+
+def _faces(rows: list[list[str]]) -> NDArray[np.int64]:
+    triangles: list[tuple[int, int, int]] = []
+    for index, row in enumerate(rows):
+        try:
+            corners = [int(word) for word in row[1 : 1 + int(row[0])]]
+        except ValueError:
+            raise MeshError(f"face {index} is not made of whole numbers; it is damaged") from None
+        if len(corners) != int(row[0]):
+            raise MeshError(f"face {index} has fewer corners than it says; it is damaged")
+        triangles += fan(corners)
+    return np.array(triangles, dtype=np.int64).reshape(-1, 3)

@@ -1,0 +1,242 @@
+"""Characters from glTF 2.0, GLB and VRM files, with the rig that they bring."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import coo_array, csr_array, vstack
+from scipy.spatial import cKDTree
+
+from devices.errors import InputError
+from devices.skeleton import Skeleton
+from runtime.characters.character import Material
+from runtime.characters.formats.mesh_data import MeshError, plain_material
+from runtime.characters.gltf.file import GltfFile
+from runtime.characters.gltf.joints import Rig, build_rig, with_connections
+from runtime.characters.gltf.material import MaterialReader
+from runtime.characters.gltf.mesh import MeshPart, read_parts
+from runtime.characters.gltf.scene import Scene, read_scene
+from runtime.characters.rig_body import body_around
+
+Array = NDArray[np.float64]
+MOST_JOINTS = 2_000
+_WHITE = np.ones(4)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GltfModel:
+    """A glTF file's default scene in its default pose; scene coordinates, +Y up.
+
+    Attributes:
+        file_vertices: (M, 3) in scene order.
+        faces: (F, 3) into `file_vertices`.
+        colors: (M, 4) linear RGBA in [0, 1], or None.
+        uvs: (M, 2) as glTF has them, or None.
+        materials: at least one.
+        face_material: (F,) into `materials`.
+        skeleton: where the file's joints stand, or None if it has no rig.
+        weights: (M, K) of the skeleton's K joints, rows sum to 1; None without a skeleton.
+        faces_backward: the character faces -Z, as VRM 0.x has it, instead of +Z.
+        notes: what was left out or guessed, one short line each.
+    """
+
+    file_vertices: Array
+    faces: NDArray[np.int64]
+    colors: NDArray[np.float32] | None
+    uvs: NDArray[np.float32] | None
+    materials: tuple[Material, ...]
+    face_material: NDArray[np.int64]
+    skeleton: Skeleton | None
+    weights: csr_array | None
+    faces_backward: bool
+    notes: tuple[str, ...] = ()
+
+
+def read_gltf(path: Path) -> GltfModel:
+    """Read a .glb, .gltf or .vrm file; a rig without a mesh is dressed as a lay figure.
+
+    Raises:
+        InputError: it cannot be read, is damaged or compressed, or holds neither mesh nor rig.
+    """
+    try:
+        return _read(path)
+    except MeshError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def _read(path: Path) -> GltfModel:
+    file = GltfFile(path)
+    scene = read_scene(file)
+    look = MaterialReader(file)
+    parts, notes = read_parts(file, scene, look)
+    joints = _skin_joints(file, parts)
+    if not parts:
+        return _dressed(file, scene, joints)
+    model = _surface(parts, look, faces_backward="VRM" in _extensions(file), notes=notes)
+    if joints:
+        return _rigged(model, _rig(file, scene, parts, joints), scene, parts)
+    joints = _humanoid_joints(file)
+    if not joints:
+        return model
+    rig = _rig(file, scene, parts, joints)
+    if not _spans(rig.skeleton, model.file_vertices):
+        note = "its humanoid bones lie outside its mesh and no skin binds them: left out"
+        return replace(model, notes=(*model.notes, note))
+    return _rigged(model, rig, scene, parts)
+
+
+def _extensions(file: GltfFile) -> frozenset[str]:
+    extensions = file.document.child("extensions")
+    return frozenset() if extensions is None else frozenset(extensions.fields)
+
+
+def _skin_joints(file: GltfFile, parts: list[MeshPart]) -> list[int]:
+    """The joints of the skins that the parts wear; of all skins if none wears one."""
+    count = len(file.entries("nodes"))
+    worn = [file.entry("nodes", p.node).whole("skin") for p in parts if p.weights is not None]
+    skins = list(dict.fromkeys(worn)) or list(range(len(file.entries("skins"))))
+    joints = [file.entry("skins", skin).wholes("joints", below=count) for skin in skins]
+    return list(dict.fromkeys(joint for some in joints for joint in some))
+
+
+def _humanoid_joints(file: GltfFile) -> list[int]:
+    """The nodes that a VRM file, 0.x or 1.0, calls bones of a human."""
+    count = len(file.entries("nodes"))
+    new = file.document.extension("VRMC_vrm")
+    old = file.document.extension("VRM")
+    if new is not None:
+        humanoid = new.child("humanoid")
+        named = None if humanoid is None else humanoid.child("humanBones")
+        bones = [] if named is None else [named.child(name) for name in named.fields]
+        return [bone.whole("node", below=count) for bone in bones if bone is not None]
+    humanoid = None if old is None else old.child("humanoid")
+    if humanoid is None:
+        return []
+    # VRM 0.x writes -1 for a bone that the model does not have.
+    present = [bone for bone in humanoid.children("humanBones") if bone.fields.get("node") != -1]
+    return [bone.whole("node", below=count) for bone in present]
+
+
+def _rig(file: GltfFile, scene: Scene, parts: list[MeshPart], joints: list[int]) -> Rig:
+    count = len(scene.parents)
+    connected = with_connections(scene, joints)
+    if len(connected) > MOST_JOINTS:
+        raise MeshError(f"its rig has {len(connected)} joints, more than {MOST_JOINTS}")
+    weight = np.zeros(count)
+    for part in parts:
+        carrier = _carrier(scene, part.node, connected)
+        if part.weights is not None:
+            weight += part.weights.sum(axis=0)
+        elif carrier is not None:
+            weight[carrier] += len(part.vertices)
+    if parts and not weight.any():
+        weight[:] = 1.0  # nothing is bound to a joint: all of them stay
+    names = [
+        node.text("name", "") or f"node {index}" for index, node in enumerate(file.entries("nodes"))
+    ]
+    return build_rig(scene, connected, weight, names, moving=bool(parts))
+
+
+def _carrier(scene: Scene, node: int, joints: set[int]) -> int | None:
+    """The joint that a node hangs on, or is."""
+    return next((other for other in (node, *scene.ancestors(node)) if other in joints), None)
+
+
+def _spans(skeleton: Skeleton, vertices: Array) -> bool:
+    """Whether a skeleton lies in the box of a mesh, a quarter larger, and is not tiny in it."""
+    lower, upper = vertices.min(axis=0), vertices.max(axis=0)
+    size = np.linalg.norm(upper - lower)
+    rest = skeleton.rest_positions
+    inside = (rest >= lower - 0.25 * size) & (rest <= upper + 0.25 * size)
+    return bool(inside.all() and np.linalg.norm(np.ptp(rest, axis=0)) > 0.25 * size)
+
+
+def _rigged(model: GltfModel, rig: Rig, scene: Scene, parts: list[MeshPart]) -> GltfModel:
+    """The model with its skeleton, every vertex bound to it; as it is if that is a single joint."""
+    if len(rig.skeleton.names) < 2:
+        return replace(model, notes=(*model.notes, "its joints stand at one place: left out"))
+    count, known = len(scene.parents), len(rig.skeleton.names)
+    kept = np.flatnonzero(rig.joint_of >= 0)
+    joints = coo_array(
+        (np.ones(len(kept)), (kept, rig.joint_of[kept])), shape=(count, known)
+    ).tocsr()
+    carriers = set(kept.tolist())
+    nearest = cKDTree(rig.skeleton.rest_positions)
+    blocks: list[csr_array] = []
+    loose = 0
+    for part in parts:
+        carrier = _carrier(scene, part.node, carriers)
+        if part.weights is not None:
+            blocks.append(part.weights @ joints)
+            continue
+        if carrier is not None:
+            bound = np.full(len(part.vertices), rig.joint_of[carrier])
+        else:
+            bound = nearest.query(part.vertices)[1]
+            loose += 1
+        ones, rows = np.ones(len(bound)), np.arange(len(bound))
+        blocks.append(coo_array((ones, (rows, bound)), shape=(len(bound), known)).tocsr())
+    notes = model.notes
+    if loose:
+        notes = (*notes, f"{loose} parts without a joint follow the nearest one")
+    weights = csr_array(vstack(blocks, format="csr"))
+    return replace(model, skeleton=rig.skeleton, weights=weights, notes=notes)
+
+
+def _surface(
+    parts: list[MeshPart], look: MaterialReader, *, faces_backward: bool, notes: list[str]
+) -> GltfModel:
+    """The parts joined, without a rig."""
+    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    vertices = np.concatenate([part.vertices for part in parts])
+    if not (np.abs(vertices) < 1e15).all():
+        raise MeshError("its pose takes vertices beyond all bounds; export the model again")
+    faces = [part.faces + start for part, start in zip(parts, starts, strict=False)]
+    slots = [np.full(len(part.faces), part.material) for part in parts]
+    colors = uvs = None
+    if any(part.colors is not None for part in parts):
+        colors = np.concatenate(
+            [np.tile(_WHITE, (len(p.vertices), 1)) if p.colors is None else p.colors for p in parts]
+        ).astype(np.float32)
+    if any(part.uvs is not None for part in parts):
+        uvs = np.concatenate(
+            [np.zeros((len(p.vertices), 2)) if p.uvs is None else p.uvs for p in parts]
+        ).astype(np.float32)
+    return GltfModel(
+        file_vertices=vertices,
+        faces=np.concatenate(faces),
+        colors=colors,
+        uvs=uvs,
+        materials=tuple(look.materials),
+        face_material=np.concatenate(slots).astype(np.int64),
+        skeleton=None,
+        weights=None,
+        faces_backward=faces_backward,
+        notes=(*notes, *dict.fromkeys(look.notes)),
+    )
+
+
+def _dressed(file: GltfFile, scene: Scene, joints: list[int]) -> GltfModel:
+    """A rig without a mesh, dressed as a lay figure."""
+    joints = joints or _humanoid_joints(file)
+    if not joints:
+        raise MeshError("it holds neither triangles nor a rig; export it with its mesh")
+    rig = _rig(file, scene, [], joints)
+    if not np.ptp(rig.skeleton.rest_positions, axis=0).max() > 1e-9:
+        raise MeshError("it holds no triangles, and all joints of its rig stand at one place")
+    vertices, faces, weights = body_around(rig.skeleton)
+    return GltfModel(
+        file_vertices=vertices,
+        faces=faces,
+        colors=None,
+        uvs=None,
+        materials=(plain_material(),),
+        face_material=np.zeros(len(faces), dtype=np.int64),
+        skeleton=rig.skeleton,
+        weights=weights,
+        faces_backward="VRM" in _extensions(file),
+        notes=("the file holds a rig without a mesh: it is dressed as a lay figure",),
+    )

@@ -1,0 +1,38 @@
+"""`bunraku info`: what is in a recording or a character's file."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from replay.formats import recognise
+from replay.info import summary
+from runtime.characters.open_character import is_character, load_character
+
+
+def info(options: argparse.Namespace) -> int:
+    """Print what is in a recording, a mesh or a rig."""
+    if is_character(options.file):
+        lines = _of_character(options.file)
+    else:
+        path = Path(options.file)
+        kind = recognise(path)
+        lines = summary(kind.read(path), path, kind.name)
+    print("\n".join(lines))
+    return 0
+
+
+def _of_character(name: str) -> list[str]:
+    character = load_character(name)
+    width, height, depth = character.vertices.max(axis=0) - character.vertices.min(axis=0)
+    parents = character.skeleton.parents
+    leaves = set(range(len(parents))) - set(parents.tolist())
+    return [
+        f"{name}: a character",
+        f"vertices    {len(character.vertices)} ({len(character.surface.vertex)} in the file)",
+        f"faces       {len(character.faces)}",
+        f"nodes       {len(parents)}, {len(leaves)} of them leaves",
+        f"rig         {'from the file' if character.weights is not None else 'none in the file'}",
+        f"on stage    {width:.2f} x {height:.2f} x {depth:.2f} m",
+        *(f"note        {note}" for note in character.notes),
+    ]

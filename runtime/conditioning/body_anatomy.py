@@ -1,0 +1,109 @@
+"""What conditioning knows of a skeleton beforehand: pairs, limbs, bones that keep their length."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from devices.bodies.anatomy import Kind, Side, label_joints
+from devices.skeleton import Skeleton
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+# What a tracker exchanges at once: whole arms and legs from where they leave the trunk, or only
+# what is beyond elbow and knee, so that each kind of joint is judged by itself.
+_GROUPS = {
+    Kind.SHOULDER: 0,
+    Kind.UPPER_ARM: 0,
+    Kind.LOWER_ARM: 1,
+    Kind.HAND: 2,
+    Kind.UPPER_LEG: 3,
+    Kind.LOWER_LEG: 4,
+    Kind.FOOT: 5,
+    Kind.TOES: 5,
+}
+_STEADY = (Kind.LOWER_ARM, Kind.HAND, Kind.LOWER_LEG, Kind.FOOT)
+_HAND_GROUP = 2
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyAnatomy:
+    """Anatomy of a skeleton's joints.
+
+    Attributes:
+        partner: (J,) the same joint of the other side; itself in the middle.
+        group: (J,) which joints are exchanged together, -1 for none.
+        bones: (B,) the far ends of the limbs' long bones, whose length a person keeps.
+        near: (B,) their near ends.
+        beyond: (B, J) bool, the far end of each and all that hangs on it.
+        feet: (F,) ankles and toes.
+        feet_rest: (F,) [m] how high above the floor these are as one stands.
+    """
+
+    partner: Indices
+    group: Indices
+    bones: Indices
+    near: Indices
+    beyond: NDArray[np.bool_]
+    feet: Indices
+    feet_rest: Array
+
+
+def body_anatomy(skeleton: Skeleton) -> BodyAnatomy:
+    """The anatomy that a skeleton's names, or its shape, tell of."""
+    parts = label_joints(skeleton)
+    count = len(skeleton.names)
+    partner, group = np.arange(count), np.full(count, -1)
+    of_side: dict[Side, dict[tuple[Kind, bool, str, int | None], list[int]]] = {
+        Side.LEFT: {},
+        Side.RIGHT: {},
+    }
+    for joint in skeleton.order:
+        part = parts[joint]
+        if part is not None and part.side in of_side:
+            key = part.kind, part.tip, part.word, part.number
+            of_side[part.side].setdefault(key, []).append(joint)
+    for key, left in of_side[Side.LEFT].items():
+        for a, b in zip(left, of_side[Side.RIGHT].get(key, []), strict=False):
+            partner[a], partner[b] = b, a
+            part = parts[a]
+            assert part is not None
+            finger = _HAND_GROUP if part.kind.value.endswith(("finger", "thumb")) else -1
+            group[a] = group[b] = _GROUPS.get(part.kind, finger)
+    far = [
+        joint
+        for joint, part in enumerate(parts)
+        if part is not None
+        and part.kind in _STEADY
+        and not part.tip
+        and (above := parts[skeleton.parents[joint]] if skeleton.parents[joint] >= 0 else None)
+        and above.side is part.side
+    ]
+    feet = [
+        joint
+        for joint, part in enumerate(parts)
+        if part is not None and part.kind in (Kind.FOOT, Kind.TOES)
+    ]
+    height = skeleton.rest_positions[:, 1]
+    sole = float(np.clip(height.min(), 0.0, 0.15))
+    return BodyAnatomy(
+        partner,
+        group,
+        np.array(far, dtype=np.int64),
+        skeleton.parents[far].astype(np.int64) if far else np.zeros(0, dtype=np.int64),
+        _beyond(skeleton, far),
+        np.array(feet, dtype=np.int64),
+        height[feet] - height.min() + sole if feet else np.zeros(0),
+    )
+
+
+def _beyond(skeleton: Skeleton, joints: list[int]) -> NDArray[np.bool_]:
+    """For each of the joints which (J,) are itself or hang on it."""
+    out = np.zeros((len(joints), len(skeleton.names)), dtype=bool)
+    out[np.arange(len(joints)), joints] = True
+    for joint in skeleton.order[1:]:
+        out[:, joint] |= out[:, skeleton.parents[joint]]
+    return out

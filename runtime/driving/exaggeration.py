@@ -1,0 +1,94 @@
+"""What makes a character move like a cartoon: what goes fast stretches, what stops is squashed.
+
+Chenney et al. 2002, Simulating cartoon style animation, stretch a body by its speed and squash it
+where it is stopped. Here each driven limb grows longer with the speed of its tip, and the whole
+body with the speed at which it rises or falls; damped springs carry both on, so that a limb or a
+body that stops is squashed for a moment. The volume is the solver's: `solvers.squash_stretch`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.kernels.compiled import kernel
+from solvers.signal.springs import Springs
+
+Array = NDArray[np.float64]
+
+FREQUENCY = 3.0  # [1/s] of the springs: about a step's
+DAMPING = 0.35  # one clear overshoot
+LIMB = 0.35  # by which share a limb grows at most
+BODY = 0.3
+FAST_LIMB = 6.0  # [1/s] limb lengths that a tip goes in a second, for most of that
+FAST_BODY = 1.2  # [1/s] body heights
+LONGEST_STEP = 0.1  # [s] between frames; after a longer one nothing is known of speeds
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Strain:
+    """How far a character is stretched by its motion.
+
+    Attributes:
+        limbs: (D,) the length of each driven chain, as a share of its own.
+        body: the height of the whole.
+    """
+
+    limbs: Array
+    body: float
+
+    @property
+    def is_none(self) -> bool:
+        """Whether nothing is stretched at all."""
+        return self.body == 1.0 and bool((self.limbs == 1.0).all())
+
+    def of_limbs(self, limbs: NDArray[np.int64]) -> Array:
+        """The lengths (n,) of these limbs, as shares of their own; -1 is none, never stretched."""
+        return np.append(self.limbs, 1.0)[limbs]
+
+
+class Exaggeration:
+    """Follows how fast a character moves.
+
+    Args:
+        lengths: (D,) [m] of the driven chains.
+        height: [m] of the character.
+    """
+
+    def __init__(self, lengths: Array, height: float) -> None:
+        self._sizes = np.maximum(np.append(lengths, height), 1e-9)
+        self._springs = Springs(np.zeros(len(lengths) + 1), frequency=FREQUENCY, damping=DAMPING)
+        self._before: tuple[float, Array, float] | None = None
+
+    def strain(self, time: float, tips: Array, lift: float, amount: float) -> Strain:
+        """How far the character is stretched at a moment.
+
+        Args:
+            time: [s].
+            tips: (D, 3) [m] from each chain's start to its tip.
+            lift: [m] how far the whole has risen.
+            amount: from 0, not at all, to 1.
+        """
+        passed = math.inf if self._before is None else time - self._before[0]
+        pulls = np.zeros(len(self._sizes))
+        if self._before is not None and 0.0 < passed <= LONGEST_STEP:
+            _, tips_before, lift_before = self._before
+            _pull(tips - tips_before, lift - lift_before, self._sizes, passed, pulls)
+        self._before = (time, tips.copy(), lift)
+        if 0.0 < passed < math.inf:
+            self._springs.step(pulls, passed)
+        lengths = 1.0 + amount * self._springs.at
+        return Strain(lengths[:-1], float(lengths[-1]))
+
+
+@kernel
+def _pull(tips: Array, lift: float, sizes: Array, passed: float, out: Array) -> None:
+    """By how much each limb, and last the body, would grow (D + 1,) that moved so far [m]."""
+    count = len(tips)
+    for d in range(count):
+        far = math.sqrt(tips[d, 0] ** 2 + tips[d, 1] ** 2 + tips[d, 2] ** 2)
+        out[d] = LIMB * math.tanh((far / sizes[d] / passed / FAST_LIMB) ** 2)
+    out[count] = BODY * math.tanh(abs(lift) / sizes[count] / passed / FAST_BODY)

@@ -1,0 +1,67 @@
+"""How firmly limbs are held: one whose performer is lost lets go, and takes hold again softly.
+
+A joint that is not seen is first held where it was, then eased to rest (`replay.fill`), and when it
+comes back it is somewhere else at once. The limb that it drives meanwhile hangs on soft handles, so
+that it is carried by its own surface, and neither tears off nor snaps back.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.deform.handles import HARD
+
+Array = NDArray[np.float64]
+
+PATIENCE = 0.25  # [s] unseen before a limb begins to let go: what flickers is held
+LET_GO = 1.0  # [s] from firm to let go
+TAKE_HOLD = 0.5  # [s] and back
+LEVELS = 16  # of firmness; going from one to the next costs a factor
+FIRMEST, LOOSEST = 10.0, 1e-3  # weights of soft handles
+LONGEST_STEP = 0.1  # [s] that a frame may count for
+
+
+class LimbRelease:
+    """Knows how firmly each of D limbs is held.
+
+    Args:
+        count: D.
+
+    Attributes:
+        weights: (D,) of the handles of each limb.
+    """
+
+    def __init__(self, count: int) -> None:
+        self.weights: Array = np.full(count, HARD)
+        self._firmness = np.ones(count)
+        self._unseen = np.zeros(count)
+        self._is_firm = True  # every limb, and seen
+        self._time = math.nan
+
+    def follow(self, time: float, seen: NDArray[np.bool_]) -> bool:
+        """Take in at `time` [s] which limbs are seen (D,); whether a weight has changed."""
+        passed = time - self._time
+        self._time = time
+        all_seen = bool(seen.all())
+        if not passed > 0.0 or (all_seen and self._is_firm):
+            return False
+        passed = min(passed, LONGEST_STEP)
+        self._unseen = np.where(seen, 0.0, self._unseen + passed)
+        falling = np.where(self._unseen > PATIENCE, -passed / LET_GO, 0.0)
+        self._firmness += np.where(seen, passed / TAKE_HOLD, falling)
+        np.clip(self._firmness, 0.0, 1.0, out=self._firmness)
+        weights = _weights(self._firmness)
+        self._is_firm = all_seen and bool((self._firmness == 1.0).all())
+        changed = not np.array_equal(weights, self.weights)
+        self.weights = weights
+        return changed
+
+
+def _weights(firmness: Array) -> Array:
+    level = np.floor(firmness * LEVELS) / LEVELS
+    soft = LOOSEST * (FIRMEST / LOOSEST) ** level
+    weights: Array = np.where(level >= 1.0, HARD, soft)
+    return weights

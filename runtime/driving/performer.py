@@ -1,0 +1,181 @@
+"""A performer as the characters see one: whole, facing the stage, moving from a rest state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from devices.bodies.anatomy import (
+    available_presets,
+    heading_joints,
+    hips_joint,
+    label_joints,
+    source_joints,
+    source_tree,
+)
+from devices.bodies.joint_names import Kind
+from devices.skeleton import Skeleton, SkeletonFrame
+from runtime.conditioning.conditioner import Conditioner, warm
+from runtime.conditioning.mirror import mirrored
+from runtime.conditioning.switches import Conditioning, filled_only
+from solvers.retarget.heading import heading, turned
+from solvers.skeleton.tree import Tree
+
+Array = NDArray[np.float64]
+
+HIGHEST_SOLE = 0.15  # [m] an ankle; a skeleton whose lowest joint is higher does not stand at rest
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Pose:
+    """What a performer does at one moment.
+
+    Attributes:
+        seen: (J, 3) [m] every joint, never NaN.
+        filled: (J,) bool, joints that were not seen, or not believed, but filled in.
+        corrected: (J,) bool, joints that were seen elsewhere: not believed, or called their
+            partner's name.
+        predicted: (J,) bool, joints that are where they will be one frame later.
+        heading: [rad] about +Y, how far the whole body has turned from facing +Z.
+        hips: (3,) [m] where the hips are; the body turns about them.
+        sole: [m] how far the lowest joint is above the floor as one stands.
+        mirrored: whether left is right.
+        scaled: whether lengths were made those of the skeleton's rest pose.
+        scale: what they were multiplied by.
+        time: [s] when; nan where it does not matter.
+        performer: the number of who it is.
+    """
+
+    seen: Array
+    filled: NDArray[np.bool_]
+    corrected: NDArray[np.bool_]
+    predicted: NDArray[np.bool_]
+    heading: float
+    hips: Array
+    sole: float
+    mirrored: bool = False
+    scaled: bool = False
+    scale: float = 1.0
+    time: float = float("nan")
+    performer: int = 0
+
+    def facing(self, heading: float) -> Array:
+        """Every joint (J, 3) [m], the whole body turned so that it has this heading [rad]."""
+        return turned(self.seen, heading - self.heading, self.hips)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rest:
+    """The rest state: what the performer does while the character stands as it was made.
+
+    Attributes:
+        positions: (J, 3) [m] every joint.
+        heading: [rad] the heading of that pose.
+        height: [m] of the hips above the floor, as one stands.
+    """
+
+    positions: Array
+    heading: float
+    height: float
+
+
+def rest_state(pose: Pose, heading: float | None = None) -> Rest:
+    """Make a pose the rest state, seen under `heading` [rad], under its own if that is None."""
+    under = pose.heading if heading is None else heading
+    height = float(pose.hips[1] - pose.seen[:, 1].min()) + pose.sole
+    return Rest(pose.facing(under), under, height)
+
+
+class Performer:
+    """Follows one performer from frame to frame.
+
+    Args:
+        skeleton: the performer's whole skeleton.
+        source: the part that drives.
+        conditioning: what is done to the frames first; only filled where None.
+
+    Attributes:
+        skeleton: the performer's whole skeleton.
+        joints: the joints that may drive a character, as chosen by `source`.
+        legs: the joints of each leg, empty for a performer without any.
+        pose: the newest pose; None before the first frame.
+
+    Raises:
+        InputError: `source` names a part or joints that this skeleton does not have.
+    """
+
+    def __init__(
+        self,
+        skeleton: Skeleton,
+        source: str = "whole",
+        conditioning: Conditioning | None = None,
+    ) -> None:
+        self.skeleton = skeleton
+        self._parents, self.joints = source_tree(skeleton, source_joints(skeleton, source))
+        there = available_presets(skeleton)
+        self.legs = [
+            frozenset(source_joints(skeleton, leg))
+            for leg in ("left-leg", "right-leg")
+            if leg in there
+        ]
+        self._pairs = np.array(heading_joints(skeleton), dtype=np.int64).reshape(-1, 2)
+        self._hips = hips_joint(skeleton)
+        self._parts = label_joints(skeleton)
+        self._conditioner = Conditioner(skeleton, conditioning or filled_only())
+        self._sole = float(np.clip(skeleton.rest_positions[:, 1].min(), 0.0, HIGHEST_SOLE))
+        self._heading = 0.0
+        self.pose: Pose | None = None
+        warm(skeleton)
+        heading(skeleton.rest_positions.copy(), self._pairs)
+
+    def follow(self, frame: SkeletonFrame) -> Pose:
+        """Take in one frame; its pose is the newest."""
+        whole = self._conditioner.condition(frame)
+        positions = whole.positions
+        self._heading = heading(positions, self._pairs, self._heading)
+        self.pose = Pose(
+            seen=positions,
+            filled=whole.filled,
+            corrected=whole.corrected,
+            predicted=whole.predicted,
+            heading=self._heading,
+            hips=positions[self._hips],
+            sole=self._sole,
+            mirrored=whole.mirrored,
+            scaled=whole.scaled,
+            scale=whole.scale,
+            time=frame.time,
+            performer=frame.performer,
+        )
+        return self.pose
+
+    @property
+    def calibrates(self) -> bool:
+        """Whether the newest pose is a T or A that has been held, to be the rest state."""
+        return self._conditioner.held
+
+    def recalibrate(self) -> None:
+        """Measure the floor and the performers' sizes anew."""
+        self._conditioner.recalibrate()
+
+    def restated(self, rest: Rest, *, mirror: bool, scale: float) -> Rest:
+        """A rest state as it would have been: mirrored, and `scale` times as large."""
+        positions = rest.positions * scale
+        if mirror:
+            positions = mirrored(positions, self._conditioner.partner)
+        heading = -rest.heading if mirror else rest.heading
+        return Rest(positions, heading, rest.height * scale)
+
+    def limb(self, chain: tuple[int, ...]) -> tuple[int, ...]:
+        """Give an arm or a leg without the bone that joins it to the trunk, two joints at least."""
+        for start, joint in enumerate(chain[:-1]):
+            part = self._parts[joint]
+            if part is not None and part.kind in (Kind.UPPER_ARM, Kind.UPPER_LEG):
+                return chain[start:]
+        return chain
+
+    def rest_tree(self) -> Tree:
+        """The chosen joints as a tree, standing as the skeleton does at rest."""
+        return Tree(self._parents, self.skeleton.rest_positions[self.joints])

@@ -1,0 +1,155 @@
+"""Characters that have held still ease to where their performer is by then; they do not jump.
+
+It is the pose shown that is eased, after conditioning: the performer goes on to be seen, matched
+and published as they are, and no filter remembers places where nobody was. Each bone turns the
+short way in the body's own frame, and so does the heading of the whole, so that nothing collapses
+on its way: halfway between an arm that was up and one that is down lies an arm that is stretched
+out, not a point.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from devices.bodies.anatomy import hips_joint
+from devices.skeleton import Skeleton
+from runtime.driving.performer import Pose, Rest
+from solvers.retarget.heading import turned
+
+Array = NDArray[np.float64]
+
+SECONDS = 0.3
+LONGEST_STEP = 0.1  # [s] that a frame may count for: who is lost on the way goes on from there
+PARALLEL = 1e-9  # sine below which two bones have no axis between them
+FRONT, UP = np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Offset:
+    """How far the pose shown was from the performer's when characters were let go.
+
+    Attributes:
+        turns: (J, 3) [rad] rotation vectors that take each joint's bone to the one shown, in the
+            body's frame.
+        lengths: (J, 3) [m] what is missing then.
+        heading: [rad] in [-pi, pi).
+        hips: (3,) [m].
+    """
+
+    turns: Array
+    lengths: Array
+    heading: float
+    hips: Array
+
+
+class UnfreezeBlend:
+    """Leads the pose that one performer's puppets follow on from where it was held.
+
+    Args:
+        skeleton: of every pose.
+    """
+
+    def __init__(self, skeleton: Skeleton) -> None:
+        self._order = [joint for joint in skeleton.order if skeleton.parents[joint] >= 0]
+        self._parents = np.where(
+            skeleton.parents < 0, np.arange(len(skeleton.parents)), skeleton.parents
+        )
+        self._hips = hips_joint(skeleton)
+        self._shown: Pose | None = None
+        self._rests: Sequence[Rest | None] = ()
+        self._offset: _Offset | None = None
+        self._held = False
+        self._at, self._passed, self._stood = -np.inf, 0.0, 0.0
+
+    def hold(self, time: float) -> None:
+        """Hold still at `time` [s]; the puppets follow nothing."""
+        if self._shown is not None:
+            self._held = True
+            self._stood += max(time - self._at, 0.0)
+            self._at = time
+
+    def follow(self, pose: Pose, time: float, rests: Sequence[Rest | None]) -> Pose:
+        """What the puppets follow at `time` [s]: the pose itself, a moment after a hold.
+
+        Its time stands still while they are held, so that what swings takes up its swing.
+
+        Args:
+            pose: the performer's newest.
+            time: [s] of the newest frame of the show, whoever it is of.
+            rests: of each puppet its performer's rest state; when another is taken, characters
+                stand elsewhere at once, and the way there is not for this to lead.
+        """
+        if not _same(rests, self._rests):
+            self._rests, self._held, self._offset = rests, False, None
+        if self._held and self._shown is not None:
+            self._offset, self._passed = self._between(pose, self._shown), 0.0
+        self._held = False
+        if self._offset is not None:
+            self._passed += min(max(time - self._at, 0.0), LONGEST_STEP)
+            pose = self._eased(pose, self._offset)
+        self._at, self._shown = time, pose
+        return replace(pose, time=pose.time - self._stood) if self._stood > 0.0 else pose
+
+    def _bones(self, pose: Pose) -> Array:
+        """Of each joint (J, 3) [m] the way from its parent, the body facing +Z."""
+        places = pose.facing(0.0)
+        bones: Array = places - places[self._parents]
+        return bones
+
+    def _between(self, pose: Pose, shown: Pose) -> _Offset:
+        bones, wanted = self._bones(pose), self._bones(shown)
+        turns = shortest_turns(bones, wanted)
+        return _Offset(
+            turns=turns,
+            lengths=wanted - Rotation.from_rotvec(turns).apply(bones),
+            heading=(shown.heading - pose.heading + np.pi) % (2.0 * np.pi) - np.pi,
+            hips=shown.hips - pose.hips,
+        )
+
+    def _eased(self, pose: Pose, offset: _Offset) -> Pose:
+        """The pose with what is left of the offset."""
+        if self._passed >= SECONDS:
+            self._offset = None
+            return pose
+        left = 1.0 - self._passed / SECONDS
+        left *= left * (3.0 - 2.0 * left)
+        bones = Rotation.from_rotvec(offset.turns * left).apply(self._bones(pose))
+        places = bones + offset.lengths * left
+        for joint in self._order:
+            places[joint] += places[self._parents[joint]]
+        places -= places[self._hips]
+        heading, hips = pose.heading + offset.heading * left, pose.hips + offset.hips * left
+        seen = turned(places, heading, np.zeros(3)) + hips
+        return replace(pose, seen=seen, heading=heading, hips=hips)
+
+
+def shortest_turns(bones: Array, wanted: Array) -> Array:
+    """Rotation vectors (n, 3) [rad] of the shortest turns that take directions to others.
+
+    Opposite ones, which have no shortest, turn through the front, and what lies along +Z or -Z
+    over the top. One without length is not turned.
+
+    Args:
+        bones: (n, 3) any length.
+        wanted: (n, 3) any length.
+    """
+    axes, cosines = np.cross(bones, wanted), (bones * wanted).sum(axis=1)
+    sines = np.linalg.norm(axes, axis=1)
+    angles = np.arctan2(sines, cosines)
+    least = PARALLEL * np.linalg.norm(bones, axis=1) * np.linalg.norm(wanted, axis=1)
+    for way in (FRONT, UP):
+        opposite = (np.linalg.norm(axes, axis=1) <= least) & (cosines < 0.0)
+        axes[opposite] = np.cross(bones[opposite], way)
+    lengths = np.linalg.norm(axes, axis=1)
+    shares = np.divide(angles, lengths, out=np.zeros(len(axes)), where=lengths > least)
+    turns: Array = axes * shares[:, None]
+    return turns
+
+
+def _same(rests: Sequence[Rest | None], before: Sequence[Rest | None]) -> bool:
+    return len(rests) == len(before) and all(a is b for a, b in zip(rests, before, strict=True))

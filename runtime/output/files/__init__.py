@@ -1,0 +1,1 @@
+"""Outputs that are files: video, pictures, point caches, animated models."""

@@ -1,0 +1,30 @@
+"""Which exporter writes a performed character to which file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from runtime.characters.character import Character
+from runtime.output.files.bvh_export import BvhExport
+from runtime.output.files.gltf_export import GltfExport
+from runtime.output.files.usd_export import UsdExport
+from runtime.output.files.whole_file import check_suffix
+from runtime.output.output import Output
+
+SUFFIXES = (".glb", ".usdc", ".usda", ".bvh")
+
+
+def open_export(path: Path, character: Character, *, rate: float = 30.0) -> Output:
+    """The export that the suffix of `path` asks for: .glb, .usda, .usdc or .bvh.
+
+    `rate` is about how many frames a second will come.
+
+    Raises:
+        InputError: another suffix, a missing library, or the file cannot be written.
+    """
+    suffix = check_suffix(path, SUFFIXES)
+    if suffix == ".glb":
+        return GltfExport(path, character)
+    if suffix == ".bvh":
+        return BvhExport(path, character)
+    return UsdExport(path, character, rate=rate)

@@ -1,0 +1,107 @@
+"""The binary glTF container: arrays, images and a description of them in one file."""
+
+from __future__ import annotations
+
+import io
+import json
+import struct
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from devices.errors import InputError
+from runtime.output.files.whole_file import whole_file
+
+ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER = 34962, 34963
+_COMPONENTS = {"float32": 5126, "uint32": 5125, "uint16": 5123}
+_SHAPES = {(): "SCALAR", (2,): "VEC2", (3,): "VEC3", (4,): "VEC4", (4, 4): "MAT4"}
+
+
+class GlbBuilder:
+    """Gathers the parts of a glTF 2.0 file; `document` is its JSON, filled in by the caller."""
+
+    def __init__(self) -> None:
+        self.document: dict[str, Any] = {
+            "asset": {"version": "2.0", "generator": "Bunraku"},
+            "accessors": [],
+            "bufferViews": [],
+        }
+        self._chunks: list[bytes] = []
+        self._length = 0
+
+    def add_array(
+        self,
+        values: NDArray[np.generic],
+        *,
+        target: int | None = None,
+        normalized: bool = False,
+        bounds: bool = False,
+    ) -> int:
+        """Store an array of float32, uint32 or uint16; give its accessor.
+
+        Matrices (n, 4, 4) are given row by row and stored column by column, as glTF has it.
+        """
+        shape = values.shape[1:]
+        accessor: dict[str, Any] = {
+            "componentType": _COMPONENTS[values.dtype.name],
+            "count": len(values),
+            "type": _SHAPES[shape],
+        }
+        if normalized:
+            accessor["normalized"] = True
+        if bounds:
+            accessor["min"] = np.atleast_1d(values.min(axis=0)).tolist()
+            accessor["max"] = np.atleast_1d(values.max(axis=0)).tolist()
+        stored = values.transpose(0, 2, 1) if shape == (4, 4) else values
+        accessor["bufferView"] = self._add_view(stored.tobytes(), target)
+        return self._add("accessors", accessor)
+
+    def add_texture(self, pixels: NDArray[np.uint8]) -> int:
+        """Store an image (h, w, 4) as PNG; give its texture."""
+        png = io.BytesIO()
+        Image.fromarray(pixels).save(png, format="PNG")
+        view = self._add_view(png.getvalue(), None)
+        image = self._add("images", {"bufferView": view, "mimeType": "image/png"})
+        return self._add("textures", {"source": image})
+
+    def save(self, path: Path) -> None:
+        """Write the file, whole.
+
+        Raises:
+            InputError: the disk fails, or the file would exceed the 4 GiB of the container.
+        """
+        document = self.document | {"buffers": [{"byteLength": self._length}]}
+        text = json.dumps(document, separators=(",", ":"), allow_nan=False).encode()
+        text += b" " * (-len(text) % 4)
+        total = 12 + 8 + len(text) + 8 + self._length
+        if total >= 2**32:
+            raise InputError(
+                f"cannot write {path}: the show is too long for one .glb file of 4 GiB; "
+                f"export a part of it"
+            )
+        with whole_file(path) as partial, partial.open("wb") as file:
+            file.write(struct.pack("<4sII", b"glTF", 2, total))
+            file.write(struct.pack("<I4s", len(text), b"JSON") + text)
+            file.write(struct.pack("<I4s", self._length, b"BIN\0"))
+            file.writelines(self._chunks)
+
+    def _add(self, key: str, item: dict[str, Any]) -> int:
+        items: list[Any] = self.document.setdefault(key, [])
+        items.append(item)
+        return len(items) - 1
+
+    def _add_view(self, data: bytes, target: int | None) -> int:
+        view: dict[str, Any] = {
+            "buffer": 0,
+            "byteOffset": self._length,
+            "byteLength": len(data),
+        }
+        if target is not None:
+            view["target"] = target
+        data += b"\0" * (-len(data) % 4)
+        self._chunks.append(data)
+        self._length += len(data)
+        return self._add("bufferViews", view)

@@ -1,0 +1,266 @@
+"""The performed character as an animated, skinned .glb."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from runtime.characters.character import Character, Material, Surface
+from runtime.output.files.glb import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, GlbBuilder
+from runtime.output.files.node_motion import NodeMotion, NodeMotionRecorder
+from runtime.output.files.whole_file import check_suffix, check_writable
+from runtime.output.output import PerformedFrame
+from solvers.surface.skin_weights import (
+    INFLUENCES,
+    PosedSamples,
+    Skin,
+    deviations,
+    fit_skin,
+    skin_of_distances,
+    skin_of_weights,
+)
+
+_SAMPLES = 64  # frames kept to fit the skin to, at most
+_STILL = 1e-6  # of the character's size: less motion than this needs no channel
+_ROUGHNESS = 0.8  # cloth and paint, as the puppets on our own stage
+
+
+@dataclass(frozen=True, slots=True)
+class SkinDeviation:
+    """How far the skinned surface is from the performed one.
+
+    Attributes:
+        rms: root of the mean square over the vertices of the sampled frames [m].
+        greatest: the greatest of them [m].
+    """
+
+    rms: float
+    greatest: float
+
+
+class GltfExport:
+    """Writes mesh, materials, skeleton, skin and animation, on the stage: metres, +Y up.
+
+    The motion is that of the skeleton's nodes, which every game engine plays; the surface follows
+    by linear blend skinning with four nodes a vertex. That approximates the performed surface: the
+    weights are those of the character's file, else they are fitted to as many as 64 frames of the
+    show. `deviation` says how near it comes, and the file itself in the mesh's ``extras``. The
+    exact surface is in the point cache and the USD export.
+
+    Everything is written at the end, in one piece.
+
+    Attributes:
+        deviation: None before `close`, and without frames.
+
+    Args:
+        path: ends in .glb.
+        character: who performs.
+
+    Raises:
+        InputError: another suffix, or the file cannot be written.
+    """
+
+    pictures_a_second = 0.0
+
+    def __init__(self, path: Path, character: Character) -> None:
+        check_suffix(path, (".glb",))
+        check_writable(path)
+        self._path, self._character = path, character
+        self._motion = NodeMotionRecorder(len(character.skeleton.names))
+        self._samples: list[PerformedFrame] = []
+        self._stride = 1  # of the frames kept in _samples
+        self._written = 0
+        self._closed = False
+        self.deviation: SkinDeviation | None = None
+
+    def write(self, frame: PerformedFrame) -> None:
+        """Keep one frame."""
+        self._motion.add(frame)
+        if self._written % self._stride == 0:
+            self._samples.append(replace(frame, vertices=frame.vertices.copy(), picture=None))
+            if len(self._samples) > _SAMPLES:
+                self._samples = self._samples[::2]
+                self._stride *= 2
+        self._written += 1
+
+    def close(self) -> None:
+        """Fit the skin and write the file; without frames it holds the rest pose.
+
+        Raises:
+            InputError: the disk fails.
+        """
+        if self._closed:
+            return
+        self._closed = True
+        skin = self._fitted_skin()
+        builder = GlbBuilder()
+        _add_skeleton(builder, self._character)
+        _add_mesh(builder, self._character, skin, self.deviation)
+        _add_animation(builder, self._character, self._motion.motion())
+        builder.save(self._path)
+
+    def _fitted_skin(self) -> Skin:
+        vertices, skeleton = self._character.vertices, self._character.skeleton
+        frames = self._samples
+        samples = PosedSamples(
+            np.array([frame.vertices for frame in frames]).reshape(-1, *vertices.shape),
+            np.array([frame.node_positions for frame in frames]),
+            np.array([frame.node_rotations for frame in frames]),
+        )
+        if self._character.weights is not None:
+            skin = skin_of_weights(self._character.weights)
+        else:
+            skin = fit_skin(vertices, skeleton, skin_of_distances(vertices, skeleton), samples)
+        if frames:
+            off = deviations(vertices, skeleton, skin, samples)
+            self.deviation = SkinDeviation(float(np.sqrt(np.mean(off**2))), float(off.max()))
+        return skin
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()
+
+
+def _add_skeleton(builder: GlbBuilder, character: Character) -> None:
+    """Nodes 0 to K - 1 are the skeleton's, node K carries the mesh; skin 0 binds them."""
+    skeleton = character.skeleton
+    rest = skeleton.rest_positions
+    nodes: list[dict[str, Any]] = []
+    for node, (name, parent) in enumerate(zip(skeleton.names, skeleton.parents, strict=True)):
+        offset = rest[node] - (rest[parent] if parent >= 0 else 0.0)
+        item: dict[str, Any] = {"name": name, "translation": offset.tolist()}
+        children = np.flatnonzero(skeleton.parents == node).tolist()
+        nodes.append(item | ({"children": children} if children else {}))
+    nodes.append({"name": character.name, "mesh": 0, "skin": 0})
+    inverse_bind = np.tile(np.eye(4, dtype=np.float32), (len(rest), 1, 1))
+    inverse_bind[:, :3, 3] = -rest
+    builder.document |= {
+        "nodes": nodes,
+        "scenes": [{"nodes": [skeleton.root, len(rest)]}],
+        "scene": 0,
+        "skins": [
+            {
+                "joints": list(range(len(rest))),
+                "skeleton": skeleton.root,
+                "inverseBindMatrices": builder.add_array(inverse_bind),
+            }
+        ],
+    }
+
+
+def _add_mesh(
+    builder: GlbBuilder, character: Character, skin: Skin, deviation: SkinDeviation | None
+) -> None:
+    """One primitive for each material in use, all on the same vertices."""
+    surface = character.surface
+    attributes = _attributes(builder, character, skin)
+    primitives: list[dict[str, Any]] = []
+    materials: list[dict[str, Any]] = []
+    for material in np.unique(surface.face_material):
+        corners = surface.faces[surface.face_material == material].astype(np.uint32).ravel()
+        primitives.append(
+            {
+                "attributes": attributes,
+                "indices": builder.add_array(corners, target=ELEMENT_ARRAY_BUFFER),
+                "material": len(materials),
+            }
+        )
+        materials.append(_material(builder, surface, surface.materials[material]))
+    mesh: dict[str, Any] = {"name": character.name, "primitives": primitives}
+    if deviation is not None:
+        mesh["extras"] = {
+            "skinDeviationRms": deviation.rms,
+            "skinDeviationGreatest": deviation.greatest,
+        }
+    builder.document |= {"meshes": [mesh], "materials": materials}
+
+
+def _attributes(builder: GlbBuilder, character: Character, skin: Skin) -> dict[str, int]:
+    surface = character.surface
+
+    def add(values: NDArray[Any], dtype: type, **options: bool) -> int:
+        return builder.add_array(values.astype(dtype), target=ARRAY_BUFFER, **options)
+
+    normals = _vertex_normals(character.vertices, character.faces)
+    nodes, weights = _four_influences(skin)
+    attributes = {
+        "POSITION": add(character.vertices[surface.vertex], np.float32, bounds=True),
+        "NORMAL": add(normals[surface.vertex], np.float32),
+        "JOINTS_0": add(nodes[surface.vertex], np.uint16),
+        "WEIGHTS_0": add(weights[surface.vertex], np.float32),
+    }
+    colors = np.clip(np.nan_to_num(surface.colors, nan=1.0), 0.0, 1.0)
+    if not (colors == 1.0).all():
+        attributes["COLOR_0"] = add(np.rint(65535 * colors), np.uint16, normalized=True)
+    if surface.uvs is not None:
+        attributes["TEXCOORD_0"] = add(np.nan_to_num(surface.uvs), np.float32)
+    return attributes
+
+
+def _four_influences(skin: Skin) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """Nodes and weights (N, 4); a node that has no weight is written as 0, as glTF wants it."""
+    padding = ((0, 0), (0, INFLUENCES - skin.nodes.shape[1]))
+    weights = np.pad(skin.weights, padding)
+    return np.where(weights > 0, np.pad(skin.nodes, padding), 0), weights
+
+
+def _material(builder: GlbBuilder, surface: Surface, material: Material) -> dict[str, Any]:
+    color = np.clip(np.nan_to_num(material.color, nan=1.0), 0.0, 1.0)
+    look: dict[str, Any] = {
+        "baseColorFactor": color.tolist(),
+        "metallicFactor": 0.0,
+        "roughnessFactor": _ROUGHNESS,
+    }
+    if material.texture is not None and surface.uvs is not None:
+        look["baseColorTexture"] = {"index": builder.add_texture(material.texture)}
+    # Surfaces of unknown origin may be open: both sides are drawn, as on our own stage.
+    described: dict[str, Any] = {"pbrMetallicRoughness": look, "doubleSided": True}
+    return described | ({"alphaMode": "BLEND"} if color[3] < 1 else {})
+
+
+def _add_animation(builder: GlbBuilder, character: Character, motion: NodeMotion) -> None:
+    """Channels for what leaves the rest pose: a bone that keeps its length only rotates."""
+    if len(motion.times) == 0:
+        return
+    skeleton = character.skeleton
+    rest = skeleton.rest_positions
+    still = _STILL * float(np.ptp(character.vertices, axis=0).max())
+    translations, rotations = motion.local(skeleton)
+    samplers: list[dict[str, Any]] = []
+    channels: list[dict[str, Any]] = []
+    times = builder.add_array(motion.times.astype(np.float32), bounds=True)
+
+    def add(node: int, path: str, values: NDArray[np.float64]) -> None:
+        output = builder.add_array(values.astype(np.float32))
+        channels.append({"sampler": len(samplers), "target": {"node": node, "path": path}})
+        samplers.append({"input": times, "output": output, "interpolation": "LINEAR"})
+
+    for node, parent in enumerate(skeleton.parents.tolist()):
+        offset = rest[node] - (rest[parent] if parent >= 0 else 0.0)
+        if np.abs(translations[:, node] - offset).max() > still:
+            add(node, "translation", translations[:, node])
+        if np.abs(rotations[:, node, :3]).max() > _STILL:
+            add(node, "rotation", rotations[:, node])
+    if channels:
+        animation = {"name": "performance", "samplers": samplers, "channels": channels}
+        builder.document["animations"] = [animation]
+
+
+def _vertex_normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Unit normals (N, 3), weighted by area; +Y where no face says otherwise."""
+    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
+    areas = np.cross(b - a, c - a)
+    normals = np.zeros_like(vertices)
+    for corner in range(3):
+        np.add.at(normals, faces[:, corner], areas)
+    lengths = np.linalg.norm(normals, axis=1, keepdims=True)
+    unit: NDArray[np.float64] = np.divide(
+        normals, lengths, out=np.tile([0.0, 1.0, 0.0], (len(vertices), 1)), where=lengths > 0
+    )
+    return unit

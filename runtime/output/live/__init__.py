@@ -1,0 +1,1 @@
+"""Outputs for other programs and machines while the show runs."""

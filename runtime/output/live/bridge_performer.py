@@ -1,0 +1,75 @@
+"""The performers of a show for other shows: what drives the characters, over a bridge."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Sequence
+from typing import Self
+
+import numpy as np
+
+from devices.skeleton import SkeletonFrame
+from runtime.driving.performer import Performer, Pose
+from runtime.output.live.bridge_publisher import BridgePublisher
+from runtime.output.output import PerformedFrame
+
+GUESSED = 0.5
+"""Confidence of a joint that was filled in or put right, as of one that a Kinect inferred."""
+FAR = 60.0  # [s] from the host's clock; a time further off is a recording's own
+
+
+class BridgePerformer:
+    """An output that publishes each pose of each performer, whatever characters follow them.
+
+    Args:
+        performers: whose poses they are, put in order and without gaps; all of one skeleton. Each
+            pose goes under its performer's number.
+        publisher: is closed with this.
+        clock: host monotonic time [s]; a show that is not on it, as fast as it can, is moved there.
+    """
+
+    pictures_a_second = 0.0
+
+    def __init__(
+        self,
+        performers: Sequence[Performer],
+        publisher: BridgePublisher,
+        clock: Callable[[], float] = time.perf_counter,
+    ) -> None:
+        self._performers = performers
+        self._publisher = publisher
+        self._clock = clock
+        self._shift = math.nan
+        self._last: list[Pose | None] = [None] * len(performers)
+
+    def write(self, frame: PerformedFrame) -> None:
+        """Publish the poses that are others than at the last frame, the oldest first."""
+        poses = [performer.pose for performer in self._performers]
+        pairs = zip(poses, self._last, strict=True)
+        fresh = [pose for pose, last in pairs if pose is not None and pose is not last]
+        self._last = poses
+        now = self._clock()
+        if fresh and math.isnan(self._shift):
+            away = now - frame.time
+            self._shift = away if abs(away) > FAR else 0.0
+        for pose in sorted(fresh, key=lambda pose: pose.time):
+            self._publisher.write(
+                SkeletonFrame(
+                    time=min(pose.time + self._shift, now),
+                    positions=pose.seen,
+                    rotations=None,
+                    confidence=np.where(pose.filled | pose.corrected, GUESSED, 1.0),
+                    performer=pose.performer,
+                )
+            )
+
+    def close(self) -> None:
+        """Publish no more; may be called twice."""
+        self._publisher.close()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.close()

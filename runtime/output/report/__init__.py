@@ -1,0 +1,1 @@
+"""Measurements of a show: the JSON report and what is counted for it."""

@@ -1,0 +1,1 @@
+"""A character that can be moved: its deformable surface and its skeleton."""

@@ -1,0 +1,159 @@
+"""The house: stage, camera, the puppets on it and the mirror that shows the performer."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from devices.skeleton import Skeleton
+from runtime.characters.character import Character
+from runtime.control.ramp import Ramp
+from runtime.driving.mapping import Mapping
+from runtime.driving.performer import Pose
+from runtime.puppet.puppet import Motion, Puppet
+from runtime.render.background import Background
+from runtime.render.camera import front_camera
+from runtime.render.inset import SkeletonInset
+from runtime.render.stage import Stage
+from runtime.render.tubes import PAIR_COLOURS
+
+if TYPE_CHECKING:
+    import moderngl
+
+GAP = 0.18  # metres of floor between two characters
+BLACKOUT = 0.3  # seconds until all is dark, and until it is light again
+ROOM = 0.12  # share of its size that a character may move beyond its rest pose and stay in view
+
+
+class Scene:
+    """Puts characters side by side on one stage and shows what they do.
+
+    Args:
+        context: the GL context of this thread.
+        size: width and height of the picture [px].
+        puppets: who is on stage, from left to right.
+        performer: the skeleton shown in the mirror.
+        background: what is there instead of house and floor; then it is plain, and without names.
+        plain: neither the matched chains nor the mirror.
+        clock: host monotonic time [s].
+
+    Attributes:
+        stage: draws.
+        camera: where the picture is taken from.
+        highlights: whether the matched chains are shown.
+        blackout: 1 where nothing of the show is to be seen.
+    """
+
+    def __init__(
+        self,
+        context: moderngl.Context,
+        size: tuple[int, int],
+        puppets: Sequence[Puppet],
+        performer: Skeleton,
+        *,
+        background: Background | None = None,
+        plain: bool = False,
+        clock: Callable[[], float] = time.perf_counter,
+    ) -> None:
+        self.blackout = Ramp(BLACKOUT, clock)
+        self.stage = Stage(context, size, background=background)
+        self._puppets = puppets
+        self._captions = len(puppets) > 1 and background is None
+        places = _side_by_side([puppet.character for puppet in puppets])
+        self._actors = [
+            self.stage.add(
+                puppet.character,
+                position=(place, 0.0, 0.0),
+                caption=puppet.character.name if self._captions else "",
+            )
+            for puppet, place in zip(puppets, places, strict=True)
+        ]
+        plain = plain or background is not None
+        self._inset = None if plain else SkeletonInset(performer.parents)
+        self.highlights = not plain
+        self.camera = front_camera()
+        self._filled: NDArray[np.float64] | None = None
+        self.frame_all()
+
+    def frame_all(self, filled: NDArray[np.float64] | None = None) -> None:
+        """Move the camera to where every character is in view, with room to move.
+
+        Args:
+            filled: (A, 2, 3) [m] what each puppet is known to fill in the show, in its own
+                coordinates; when None what was known before, else a guess from the rest poses.
+        """
+        boxes = self.stage.boxes
+        self._filled = filled = self._filled if filled is None else filled
+        if filled is None:
+            room = ROOM * np.ptp(boxes, axis=1).max(axis=1)[:, None]
+            boxes[:, 0, ::2] -= room
+            boxes[:, 1] += room
+        else:
+            places = np.array([actor.position for actor in self._actors])[:, None]
+            moved = filled + places
+            boxes = np.stack(
+                [np.minimum(boxes[:, 0], moved[:, 0]), np.maximum(boxes[:, 1], moved[:, 1])], axis=1
+            )
+        self.camera = self.camera.frame(boxes, self.stage.aspect)
+
+    def show(self, pose: Pose | None, motions: Sequence[Motion]) -> None:
+        """Draw the puppets as they are now, and the performer in the mirror."""
+        self.upload(motions)
+        self.draw(pose)
+
+    def upload(self, motions: Sequence[Motion]) -> None:
+        """Give the GPU the puppets as they are now."""
+        for actor, motion in zip(self._actors, motions, strict=True):
+            actor.update(motion.vertices)
+
+    def draw(self, pose: Pose | None) -> None:
+        """Draw what was uploaded, the chains as they are now, and the performer in the mirror."""
+        for actor, puppet in zip(self._actors, self._puppets, strict=True):
+            chains = puppet.chains if self.highlights else []
+            actor.highlight(chains, _colours(len(chains)))
+        if self._inset is not None and pose is not None:
+            self._inset.update(
+                pose.seen,
+                colours=_joint_colours(len(pose.seen), self._puppets[0].mapping),
+                dimmed=pose.filled,
+            )
+        self.stage.brightness = 1.0 - self.blackout.level
+        self.stage.draw(self.camera, self._inset if pose is not None else None)
+
+    def picture(self) -> NDArray[np.uint8]:
+        """The newest picture (H, W, 4): sRGB with straight alpha, top row first."""
+        return self.stage.read()
+
+    def close(self) -> None:
+        """Free the stage."""
+        self.stage.release()
+
+
+def _side_by_side(characters: Sequence[Character]) -> list[float]:
+    """Where on the x axis [m] each character stands, the row centred."""
+    places, right = [], 0.0
+    for character in characters:
+        low, high = character.vertices[:, 0].min(), character.vertices[:, 0].max()
+        places.append(right - float(low))
+        right += float(high - low) + GAP
+    middle = (right - GAP) / 2.0
+    if len(characters) == 1:
+        return [0.0]
+    return [place - middle for place in places]
+
+
+def _colours(count: int) -> NDArray[np.float64]:
+    """Linear RGB (C, 3) of so many chains."""
+    return PAIR_COLOURS[np.arange(count) % len(PAIR_COLOURS)]
+
+
+def _joint_colours(joints: int, mapping: Mapping) -> NDArray[np.float64]:
+    """Linear RGB of each joint (J, 3) by the chain that it drives; NaN where it drives nothing."""
+    colours = np.full((joints, 3), np.nan)
+    for drive, colour in zip(mapping.drives, _colours(len(mapping.drives)), strict=True):
+        colours[list(drive.source[1:])] = colour
+    return colours

@@ -1,0 +1,1 @@
+"""Parts of the deformation solvers: handles, cells, rotations, volume."""

@@ -1,0 +1,124 @@
+"""What a deformation solver is given, checked at the door and put into the order that it works in.
+
+The order is the factor's, so that neighbours lie near each other in memory. It does not depend on
+the handles, which may come and go.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import ArrayLike
+from scipy.sparse.csgraph import connected_components
+
+from solvers.kernels.compiled import kernel
+from solvers.linear.laplacian import Floats, Ints
+from solvers.linear.nested_dissection import Dissection, dissect
+
+_FARTHEST = 1e9  # the farthest target, in sizes of the mesh; keeps every square finite
+
+
+@dataclass(frozen=True, slots=True)
+class Frame:
+    """A centre (3,) and a size: inside coordinates are about one, whatever the mesh's unit is."""
+
+    centre: Floats
+    size: float
+
+    @classmethod
+    def around(cls, points: Floats) -> Frame:
+        """The frame of a point set's bounding box; a set that is one point has size one."""
+        low, high = points.min(axis=0), points.max(axis=0)
+        size = float(np.linalg.norm(high - low))
+        return cls(low + 0.5 * (high - low), size if size > 0.0 else 1.0)
+
+    def inside(self, points: Floats) -> Floats:
+        """Points (N, 3) in this frame."""
+        return (points - self.centre) / self.size
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """The working order of N vertices.
+
+    Vertex order[i] is worked on i-th, and place[v] says when vertex v is. `faces` (F, 3) and
+    `parts` (N,), the connected component of each vertex, are in that order; `tree` is the
+    dissection whose order it is.
+    """
+
+    order: Ints
+    place: Ints
+    faces: Ints
+    parts: Ints
+    tree: Dissection
+
+
+def checked_mesh(vertices: ArrayLike, faces: ArrayLike) -> tuple[Floats, Ints]:
+    """Vertices (N, 3) and faces (F, 3), or a ValueError that says what is wrong with them."""
+    points = np.asarray(vertices, dtype=np.float64)
+    if points.ndim != 2 or points.shape[1] != 3 or not len(points):
+        raise ValueError(f"expected vertices of shape (N, 3), N > 0, got {points.shape}")
+    if not np.isfinite(points).all():
+        bad = int(np.flatnonzero(~np.isfinite(points).all(axis=1))[0])
+        raise ValueError(f"vertex {bad} is not finite: {points[bad]}")
+    if np.abs(points).max() > 1e100:
+        raise ValueError("vertices beyond 1e100 are out of range")
+    triangles = checked_integers(faces, "faces").reshape(-1, 3) if np.size(faces) == 0 else faces
+    triangles = checked_integers(triangles, "faces")
+    if triangles.ndim != 2 or triangles.shape[1] != 3:
+        raise ValueError(f"expected faces of shape (F, 3), got {triangles.shape}")
+    check_range(triangles, len(points), "faces")
+    return points, triangles
+
+
+def checked_targets(targets: ArrayLike, count: int, frame: Frame) -> Floats:
+    """Targets (H, 3), or a ValueError that says what is wrong with them."""
+    points = np.asarray(targets, dtype=np.float64)
+    if points.shape != (count, 3):
+        raise ValueError(f"expected targets of shape ({count}, 3), got {points.shape}")
+    points = np.ascontiguousarray(points)
+    bad = _first_beyond(points, frame.centre, _FARTHEST * frame.size)
+    if bad >= 0:
+        raise ValueError(f"target {bad} is not finite, or absurdly far away: {points[bad]}")
+    return points
+
+
+@kernel
+def _first_beyond(points: Floats, centre: Floats, most: float) -> int:
+    """The first of the points that is not within `most` of the centre on every axis, or -1."""
+    for h in range(len(points)):
+        for axis in range(3):
+            if not abs(points[h, axis] - centre[axis]) <= most:  # as NaN is not
+                return h
+    return -1
+
+
+def lay_out(points: Floats, faces: Ints) -> Layout:
+    """The order in which the vertices at `points` (N, 3) are worked on."""
+    count = len(points)
+    tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
+    graph = sp.coo_matrix((np.ones(len(tails)), (tails, heads)), shape=(count, count)).tocsr()
+    graph = sp.csr_matrix(graph + graph.T)
+    _, part_of = connected_components(graph, directed=False)
+    tree = dissect(graph, points)
+    order = tree.order.astype(np.int64)
+    place = np.empty(count, dtype=np.int64)
+    place[order] = np.arange(count)
+    return Layout(order, place, place[faces], part_of[order], tree)
+
+
+def checked_integers(values: ArrayLike, name: str) -> Ints:
+    """An array of integers, or a ValueError that names it."""
+    array = np.asarray(values)
+    if array.size and not np.issubdtype(array.dtype, np.integer):
+        raise ValueError(f"expected integer {name}, got {array.dtype}")
+    return array.astype(np.int64)
+
+
+def check_range(indices: Ints, count: int, name: str) -> None:
+    """Raise a ValueError if an index does not name one of `count` vertices."""
+    if indices.size and (indices.min() < 0 or indices.max() >= count):
+        bad = indices[(indices < 0) | (indices >= count)].ravel()[0]
+        raise ValueError(f"{name} name vertex {bad}, but there are {count} vertices")

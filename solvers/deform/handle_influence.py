@@ -1,0 +1,126 @@
+"""How a surface goes along with its handles before it bends, while handles come and go.
+
+Each vertex follows a smooth blend of the motions of the groups of handles that matter most to it.
+The shares of the blend are harmonic functions of the held surface. When other handles are held, the
+shares that are known go on being used, and new ones are found a few at a time, tick by tick, so
+that no frame waits for them; nothing depends on how fast the machine is.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.deform.handle_motion import KEPT, Influences, fit_motions
+from solvers.deform.handles import Handles
+from solvers.kernels.compiled import kernel
+from solvers.linear.constrained_system import ConstrainedSystem
+from solvers.linear.laplacian import Floats, Ints
+
+ROUNDS = 1  # of three groups each, in a tick
+
+
+class Following:
+    """Finds which groups of handles a surface's vertices follow.
+
+    Args:
+        system: the surface as the handles hold it; it is asked again when they change.
+        handles: who is followed.
+
+    Attributes:
+        influences: the groups that each vertex follows, in the numbers of when they were found.
+        known: (H,) the group of each handle in those numbers, -1 for one that came since.
+    """
+
+    influences: Influences
+    known: Ints
+    _next: int
+    _handles: Handles
+
+    def __init__(self, system: ConstrainedSystem, handles: Handles) -> None:
+        self._system = system
+        self._scratch = np.empty((len(system.held.fixed), 3))
+        self._changed = False
+        self._begin(handles)
+        self._complete()
+
+    def hold(self, handles: Handles) -> None:
+        """Follow these from now on: other vertices, or other groups."""
+        self._begin(handles)
+        self.known = self._group_at[handles.places]
+        if not (self.known >= 0).any():
+            self._complete()
+
+    def reweigh(self, handles: Handles) -> None:
+        """Know that the same handles hold otherwise; what is being found is found to the end."""
+        self._changed = True
+        if self._next >= self._handles.count:
+            self._begin(handles)
+        self._latest = handles
+
+    def advance(self) -> None:
+        """Find a few of the shares that are not known yet."""
+        for _ in range(ROUNDS):
+            if self._next >= self._handles.count:
+                return
+            self._find_three()
+
+    def motions(self, before: Floats, after: Floats) -> Floats:
+        """The groups' motions (G, 8) that take the handles from `before` (H, 3) to `after`."""
+        return fit_motions(before, after, self.known, self._count)
+
+    def _begin(self, handles: Handles) -> None:
+        self._handles = self._latest = handles
+        self._changed = False
+        self._next = 0
+        self._new_group_at = np.full(len(self._scratch), -1, dtype=np.int64)
+        self._new_group_at[handles.places] = handles.group_of
+        self._groups = np.zeros((len(self._scratch), KEPT), dtype=np.uint32)
+        self._weights = np.zeros((len(self._scratch), KEPT))
+
+    def _complete(self) -> None:
+        while self._next < self._handles.count:
+            self._find_three()
+
+    def _find_three(self) -> None:
+        self._system.harmonic(self._new_group_at, self._next, self._scratch)
+        most = min(self._handles.count - self._next, 3)
+        _keep_largest(self._scratch, self._next, most, self._groups, self._weights)
+        self._next += 3
+        if self._next >= self._handles.count:
+            _normalise(self._weights)
+            self.influences = Influences(self._groups, self._weights)
+            self._count = self._handles.count
+            self._group_at = self._new_group_at
+            self.known = self._group_at[self._handles.places]
+            if self._changed:
+                self._begin(self._latest)
+
+
+@kernel
+def _keep_largest(
+    shares: Floats, first: int, most: int, groups: NDArray[np.uint32], weights: Floats
+) -> None:
+    """Insert three more groups' shares into each row's list, largest first."""
+    for i in range(len(groups)):
+        for k in range(most):
+            w = shares[i, k]
+            if w > weights[i, KEPT - 1]:
+                slot = KEPT - 1
+                while slot > 0 and w > weights[i, slot - 1]:
+                    weights[i, slot], groups[i, slot] = weights[i, slot - 1], groups[i, slot - 1]
+                    slot -= 1
+                weights[i, slot], groups[i, slot] = w, first + k
+
+
+@kernel
+def _normalise(weights: Floats) -> None:
+    """Let each row sum to one; one that no share reaches follows its first group."""
+    for i in range(len(weights)):
+        total = 0.0
+        for k in range(KEPT):
+            total += weights[i, k]
+        if total == 0.0:
+            weights[i, 0] = total = 1.0
+        for k in range(KEPT):
+            weights[i, k] /= total

@@ -1,0 +1,90 @@
+"""Unit quaternions (x, y, z, w) inside compiled loops, as tuples that stay in registers."""
+
+from __future__ import annotations
+
+import math
+
+from solvers.kernels.compiled import kernel
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+
+
+@kernel
+def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
+    """The rotation `b` followed by `a`."""
+    ax, ay, az, aw = a
+    bx, by, bz, bw = b
+    return (
+        aw * bx + ax * bw + ay * bz - az * by,
+        aw * by - ax * bz + ay * bw + az * bx,
+        aw * bz + ax * by - ay * bx + az * bw,
+        aw * bw - ax * bx - ay * by - az * bz,
+    )
+
+
+@kernel
+def conjugate(q: Quaternion) -> Quaternion:
+    """The inverse rotation."""
+    return (-q[0], -q[1], -q[2], q[3])
+
+
+@kernel
+def rotate(q: Quaternion, v: Vector) -> Vector:
+    """The vector `v` turned by `q`."""
+    x, y, z, w = q
+    tx = 2.0 * (y * v[2] - z * v[1])
+    ty = 2.0 * (z * v[0] - x * v[2])
+    tz = 2.0 * (x * v[1] - y * v[0])
+    return (
+        v[0] + w * tx + y * tz - z * ty,
+        v[1] + w * ty + z * tx - x * tz,
+        v[2] + w * tz + x * ty - y * tx,
+    )
+
+
+@kernel
+def normalized(q: Quaternion) -> Quaternion:
+    """`q` at unit length; the identity where it has none."""
+    norm = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
+    if norm < 1e-300:
+        return (0.0, 0.0, 0.0, 1.0)
+    return (q[0] / norm, q[1] / norm, q[2] / norm, q[3] / norm)
+
+
+@kernel
+def between(a: Vector, b: Vector, axis: Vector) -> Quaternion:
+    """The smallest rotation that takes the unit vector `a` to `b`; about `axis` if they oppose."""
+    w = 1.0 + a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    if w > 1e-12:
+        x = a[1] * b[2] - a[2] * b[1]
+        y = a[2] * b[0] - a[0] * b[2]
+        z = a[0] * b[1] - a[1] * b[0]
+        return normalized((x, y, z, w))
+    along = axis[0] * a[0] + axis[1] * a[1] + axis[2] * a[2]
+    x, y, z = axis[0] - along * a[0], axis[1] - along * a[1], axis[2] - along * a[2]
+    if x * x + y * y + z * z < 1e-12:  # the axis lies along the vector: any other will do
+        x, y, z = (0.0, -a[2], a[1]) if abs(a[0]) < 0.9 else (-a[2], 0.0, a[0])
+    return normalized((x, y, z, 0.0))
+
+
+@kernel
+def power(q: Quaternion, t: float) -> Quaternion:
+    """The share `t` of the turn `q`, the way its sign says: over 180 degrees where w < 0."""
+    sine = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2])
+    if sine < 1e-12:
+        return (0.0, 0.0, 0.0, 1.0)
+    half = t * math.atan2(sine, q[3])
+    scale = math.sin(half) / sine
+    return (q[0] * scale, q[1] * scale, q[2] * scale, math.cos(half))
+
+
+@kernel
+def matrix(q: Quaternion) -> tuple[Vector, Vector, Vector]:
+    """The rows of the unit quaternion's rotation matrix."""
+    x, y, z, w = q
+    return (
+        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)),
+        (2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)),
+        (2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)),
+    )

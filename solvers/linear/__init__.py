@@ -1,0 +1,1 @@
+"""Sparse linear algebra for the global step of the deformation."""

@@ -1,0 +1,1 @@
+"""Parts of matching and motion transfer: skeleton abstraction, polylines, headings."""

@@ -1,0 +1,107 @@
+"""The motions of all the chains of a body, carried over to a character in one call a frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.kernels.compiled import kernel
+from solvers.kernels.quaternion import power
+from solvers.retarget.polyline_motion import ChainMap, follow_bones, sample_bones
+
+Array = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+
+class _Chains(NamedTuple):
+    """`ChainMap`s one after another; rows first[d] to first[d + 1] are chain d's."""
+
+    first_bone: Ints  # (D + 1,)
+    first_sample: Ints  # (D + 1,)
+    joints: Ints  # (B + D,) where a body has the nodes of the sources
+    rest: Array  # (B, 3)
+    axes: Array  # (D, 3)
+    bones: Ints  # (S, 2)
+    shares: Array  # (S,)
+    changes: Array  # (D, 3, 3)
+
+
+class ChainRetargets:
+    """Carries D motions of one body over to as many target polylines, frame by frame.
+
+    Rotations are measured in the body's world, and given in the targets': a limb on a spine that
+    bends already holds the spine's turn.
+
+    Args:
+        maps: how each chain's motion is carried over.
+        sources: for each, the joints of the body that are its source's nodes.
+
+    Raises:
+        ValueError: a source that has not one joint for each of its nodes.
+    """
+
+    def __init__(self, maps: Sequence[ChainMap], sources: Sequence[Sequence[int]]) -> None:
+        for chain, source in zip(maps, sources, strict=True):
+            if len(source) != len(chain.rest) + 1:
+                raise ValueError(f"expected {len(chain.rest) + 1} joints, got {len(source)}")
+        self._chains = _Chains(
+            _firsts([len(chain.rest) for chain in maps]),
+            _firsts([len(chain.bones) for chain in maps]),
+            np.array([joint for source in sources for joint in source], dtype=np.int64),
+            np.concatenate([np.zeros((0, 3)), *(chain.rest for chain in maps)]),
+            np.array([chain.axis for chain in maps]).reshape(-1, 3),
+            np.concatenate([np.zeros((0, 2), dtype=np.int64), *(chain.bones for chain in maps)]),
+            np.concatenate([np.zeros(0), *(chain.shares for chain in maps)]),
+            np.array([chain.change for chain in maps]).reshape(-1, 3, 3),
+        )
+        self._joints = int(self._chains.joints.max(initial=-1)) + 1
+        self._turns = np.zeros((len(self._chains.rest), 4))
+        self._last = np.zeros((len(self._chains.rest), 3))
+
+    def reset(self) -> None:
+        """Forget the last frame, as after a cut."""
+        self._turns[:] = 0.0
+
+    def rotations(self, body: Array, gains: Array) -> Array:
+        """World rotations (S, 4) of all target bones from rest, chain after chain.
+
+        Args:
+            body: (J, 3) where the body's joints are, finite.
+            gains: (D,) the share of each chain's turns that is carried over, in (0, 1].
+
+        Raises:
+            ValueError: a joint or a gain is missing.
+        """
+        count = len(self._chains.axes)
+        if body.ndim != 2 or body.shape[1] != 3 or len(body) < self._joints:
+            raise ValueError(f"expected at least {self._joints} joints (J, 3), got {body.shape}")
+        if gains.shape != (count,):
+            raise ValueError(f"expected gains of shape ({count},), got {gains.shape}")
+        rotations = np.empty((len(self._chains.shares), 4))
+        points = np.ascontiguousarray(body, dtype=np.float64)
+        _retarget(self._chains, points, gains, self._turns, self._last, rotations)
+        return rotations
+
+
+def _firsts(sizes: Sequence[int]) -> Ints:
+    return np.concatenate([[0], np.cumsum(sizes)]).astype(np.int64)
+
+
+@kernel
+def _retarget(  # noqa: PLR0917
+    chains: _Chains, body: Array, gains: Array, turns: Array, last: Array, out: Array
+) -> None:
+    for d in range(len(gains)):
+        first, end = chains.first_bone[d], chains.first_bone[d + 1]
+        pose = body[chains.joints[first + d : end + d + 1]]
+        own = turns[first:end]
+        follow_bones(chains.rest[first:end], pose, chains.axes[d], own, last[first:end])
+        a, b = chains.first_sample[d], chains.first_sample[d + 1]
+        sample_bones(own, chains.bones[a:b], chains.shares[a:b], chains.changes[d], out[a:b])
+        if gains[d] != 1.0:
+            for j in range(a, b):
+                q = power((out[j, 0], out[j, 1], out[j, 2], out[j, 3]), gains[d])
+                out[j, 0], out[j, 1], out[j, 2], out[j, 3] = q

@@ -1,0 +1,62 @@
+"""Where a character stands: its whole turned about the vertical, and kept above the floor."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.kernels.compiled import kernel
+from solvers.kernels.quaternion import multiply
+
+Array = NDArray[np.float64]
+
+
+def stand(points: Array, angle: float, about: Array, lift: float, out: Array) -> float:
+    """Put points (N, 3) [m], turned as by `heading.turned` and then lifted, into `out` (N, 3).
+
+    Nothing may sink into the floor, y = 0: what pushes against it lifts the whole.
+
+    Args:
+        points: (N, 3) [m], N > 0.
+        angle: [rad] about the vertical through `about` (3,) [m].
+        about: what is turned about.
+        lift: [m] how far they rise at least.
+        out: where they are put; not `points` itself.
+
+    Returns:
+        How far they rise [m].
+    """
+    return _stand(points, math.cos(angle), math.sin(angle), about, lift, out)
+
+
+@kernel
+def _stand(  # noqa: PLR0917
+    points: Array, cosine: float, sine: float, about: Array, lift: float, out: Array
+) -> float:
+    lowest = np.inf
+    for i in range(len(points)):
+        x, z = points[i, 0] - about[0], points[i, 2] - about[2]
+        out[i, 0] = about[0] + (cosine * x + sine * z)
+        out[i, 2] = about[2] + (cosine * z - sine * x)
+        lowest = min(lowest, points[i, 1])
+    rise = max(lift, -lowest)
+    for i in range(len(points)):
+        out[i, 1] = points[i, 1] + rise
+    return rise
+
+
+def turned_rotations(rotations: Array, angle: float) -> Array:
+    """World rotations (K, 4), unit quaternions, turned on by `angle` [rad] about the vertical."""
+    out = np.empty_like(rotations)
+    _turn_on(rotations, math.cos(0.5 * angle), math.sin(0.5 * angle), out)
+    return out
+
+
+@kernel
+def _turn_on(rotations: Array, cosine: float, sine: float, out: Array) -> None:
+    for k in range(len(rotations)):
+        own = (rotations[k, 0], rotations[k, 1], rotations[k, 2], rotations[k, 3])
+        whole = multiply((0.0, sine, 0.0, cosine), own)
+        out[k, 0], out[k, 1], out[k, 2], out[k, 3] = whole

@@ -1,0 +1,1 @@
+"""Filters and statistics over time series of points."""

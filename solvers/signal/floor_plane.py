@@ -1,0 +1,66 @@
+"""The floor under somebody's feet, as a plane fitted to where they stood.
+
+Least squares with forgetting: only six sums are kept. A small penalty on the slope keeps the floor
+level as long as the feet have stood at one place only, where any slope would fit.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.kernels.compiled import kernel
+
+Array = NDArray[np.float64]
+
+MEMORY = 10.0  # [s] after which a step counts half
+STIFFNESS = 0.5  # [s m^2] of standing a metre away that tilts as much as the level floor holds
+STEEPEST = 0.6  # slope, about 30 degrees; what is steeper was no floor
+
+
+class FloorFit:
+    """A plane y = a x + b z + c through points that come one by one.
+
+    Attributes:
+        weight: [s] of standing that is remembered.
+    """
+
+    def __init__(self) -> None:
+        self._normal = np.zeros((3, 3))
+        self._right = np.zeros(3)
+        self.weight = 0.0
+
+    def add(self, points: Array, dt: float) -> None:
+        """Take in where feet stood (n, 3) [m] for `dt` [s]."""
+        keep = 0.5 ** (dt / MEMORY)
+        _add(self._normal, self._right, points, keep, dt)
+        self.weight = keep * self.weight + dt * len(points)
+
+    def plane(self) -> tuple[float, float, float]:
+        """The slopes along x and z and the height [m] at the origin; level at 0 before any step."""
+        if self.weight <= 0.0:
+            return 0.0, 0.0, 0.0
+        (xx, xz, x), (_, zz, z), _ = self._normal.tolist()
+        xy, zy, y = self._right.tolist()
+        middle_x, middle_z, middle_y = x / self.weight, z / self.weight, y / self.weight
+        xx, xz, zz = xx + STIFFNESS - x * middle_x, xz - x * middle_z, zz + STIFFNESS - z * middle_z
+        xy, zy = xy - y * middle_x, zy - y * middle_z
+        determinant = xx * zz - xz * xz  # at least STIFFNESS squared
+        a, b = (zz * xy - xz * zy) / determinant, (xx * zy - xz * xy) / determinant
+        gentle = STEEPEST / max(math.hypot(a, b), STEEPEST)
+        a, b = a * gentle, b * gentle
+        return a, b, middle_y - a * middle_x - b * middle_z
+
+
+@kernel
+def _add(normal: Array, right: Array, points: Array, keep: float, dt: float) -> None:
+    normal *= keep
+    right *= keep
+    for point in points:
+        row = point[0], point[2], 1.0
+        for i in range(3):
+            right[i] += dt * row[i] * point[1]
+            for j in range(3):
+                normal[i, j] += dt * row[i] * row[j]

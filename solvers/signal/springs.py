@@ -1,0 +1,58 @@
+"""Damped springs: what is pulled to a target overshoots a little and comes to rest there.
+
+The motion of each is the exact solution for a target that stands still during a step, so that any
+step is stable and two short steps are one long one.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from solvers.kernels.compiled import kernel
+
+Array = NDArray[np.float64]
+
+
+class Springs:
+    """A number of like springs, at rest where they begin.
+
+    Args:
+        start: (n,) where they are.
+        frequency: of the undamped spring [1/s].
+        damping: share of the critical, in (0, 1).
+
+    Attributes:
+        at: (n,) where they are now.
+        speed: (n,) [1/s].
+    """
+
+    def __init__(self, start: ArrayLike, *, frequency: float, damping: float) -> None:
+        self.at: Array = np.array(start, dtype=np.float64)
+        self.speed: Array = np.zeros_like(self.at)
+        self._omega = 2.0 * math.pi * frequency
+        self._damping = damping
+
+    def step(self, target: ArrayLike, seconds: float) -> Array:
+        """Where they are (n,) after `seconds` [s] of being pulled to `target` (n,).
+
+        The next step overwrites it.
+        """
+        goal = np.ascontiguousarray(target, dtype=np.float64)
+        decay = self._damping * self._omega
+        turn = self._omega * math.sqrt(1.0 - self._damping**2)
+        fade = math.exp(-decay * seconds)
+        cosine, sine = fade * math.cos(turn * seconds), fade * math.sin(turn * seconds) / turn
+        _step(self.at, self.speed, goal, (cosine, sine, decay, self._omega**2))
+        return self.at
+
+
+@kernel
+def _step(at: Array, speed: Array, goal: Array, factors: tuple[float, float, float, float]) -> None:
+    cosine, sine, decay, stiffness = factors
+    for i in range(len(at)):
+        away, fast = at[i] - goal[i], speed[i]
+        speed[i] = cosine * fast - sine * (stiffness * away + decay * fast)
+        at[i] = goal[i] + cosine * away + sine * (fast + decay * away)

@@ -1,0 +1,1 @@
+"""Skeletons: trees, extraction from a surface, forward kinematics, anchors in a surface."""

@@ -1,0 +1,1 @@
+"""Triangle surfaces: edges, decimation, dense-to-coarse embedding, skin weights."""

@@ -1,0 +1,485 @@
+from __future__ import annotations
+
+import ctypes
+import shutil
+import struct
+import subprocess
+import threading
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from devices.bodies.body_numbers import BodyNumbers
+from devices.bodies.floor_level import FloorLevel
+from devices.errors import InputError
+from devices.kinect import azure as kinect_azure
+from devices.kinect import v1 as kinect_v1
+from devices.kinect import v2 as kinect_v2
+from devices.kinect.azure import KinectAzure, Setup
+from devices.kinect.bodies import KinectDecoder, Sensor
+from devices.kinect.joints import KINECT_AZURE, KINECT_V1, KINECT_V2
+from devices.kinect.v1 import KinectV1
+from devices.kinect.v2 import KinectV2
+from devices.leap import leapc
+from devices.leap.joints import SIDES, leap_to_world
+from devices.leap.leapc import LeapC, LeapCDecoder
+from devices.skeleton import SkeletonFrame
+from devices.stream import open_stream
+from devices.transport import sdk_library
+from devices.transport.live_stream import LiveStream
+from devices.transport.sdk_library import SensorSource, SensorTransport
+from devices.transport.senders import Decoder
+
+FAKE = Path(__file__).with_name("fake_sensors.c")
+PATIENCE = 20.0  # [s], far more than is needed
+SENSORS = (kinect_v1.SENSOR, kinect_v2.SENSOR, kinect_azure.SENSOR)
+
+
+@pytest.fixture(scope="module")
+def fake(tmp_path_factory: pytest.TempPathFactory) -> ctypes.CDLL:
+    """A library with the makers' functions, compiled from their documented interfaces."""
+    compiler = shutil.which("cc") or shutil.which("gcc")
+    if compiler is None:
+        pytest.skip("needs a C compiler to make the stand-ins for the makers' libraries")
+    built = tmp_path_factory.mktemp("fake") / "fake_sensors.so"
+    subprocess.run([compiler, "-shared", "-fPIC", "-o", str(built), str(FAKE)], check=True)
+    return ctypes.CDLL(str(built))
+
+
+def watch(source: Callable[[], SensorSource], decoder: Callable[[], Decoder]) -> LiveStream:
+    return LiveStream(SensorTransport(source), decoder)
+
+
+def take(stream: LiveStream, count: int) -> list[SkeletonFrame]:
+    """The next `count` frames, or a failure when they do not come."""
+    frames: list[SkeletonFrame] = []
+    until = time.monotonic() + PATIENCE
+    pause = threading.Event()
+    while len(frames) < count and time.monotonic() < until:
+        frames += stream.poll()
+        pause.wait(0.002)
+    assert len(frames) >= count, stream.traffic
+    return frames
+
+
+def until(condition: Callable[[], bool]) -> bool:
+    end, pause = time.monotonic() + PATIENCE, threading.Event()
+    while not condition() and time.monotonic() < end:
+        pause.wait(0.002)
+    return condition()
+
+
+# -- layouts --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("layout", "size"),
+    [
+        (kinect_v1.SkeletonData, 436),
+        (kinect_v1.NuiSkeletonFrame, 2664),
+        (kinect_v1.BoneOrientation, 168),
+        (kinect_v2.Joint, 20),
+        (kinect_v2.JointOrientation, 20),
+        (kinect_azure.AzureJoint, 32),
+        (kinect_azure.AzureBody, 1028),
+        (kinect_azure.DeviceConfiguration, 36),
+        (kinect_azure.TrackerConfiguration, 24),
+        (kinect_azure.ImuSample, 48),
+        (leapc.Bone, 44),
+        (leapc.Digit, 184),
+        (leapc.Palm, 80),
+        (leapc.LeapHand, 1084),
+        (leapc.TrackingEvent, 48),
+        (leapc.Message, 20),
+    ],
+)
+def test_structures_have_the_sizes_that_the_makers_state(
+    layout: type[ctypes.Structure], size: int
+) -> None:
+    assert ctypes.sizeof(layout) == size
+
+
+# -- bytes of one SDK frame, packed by hand -------------------------------------------------------
+
+
+def v1_packet(people: dict[int, tuple[int, int, Sequence[float]]], floor: Sequence[float]) -> bytes:
+    """A frame with people in slots: tracking state, id, and the place of every joint."""
+    data = struct.pack("<qII4f4f", 1500, 1, 0, *floor, 0, 1, 0, 0)
+    bones = b""
+    for slot in range(6):
+        state, body, place = people.get(slot, (0, 0, (0.0, 0.0, 0.0)))
+        data += struct.pack("<4I4f", state, body, 0, 0, *place, 1)
+        data += struct.pack("<4f", *place, 1) * 20
+        data += struct.pack("<20I", *(joint % 3 for joint in range(20))) + bytes(4)
+        for joint in range(20):
+            bones += struct.pack("<2I", joint, 0) + bytes(80 + 64)
+            bones += struct.pack("<4f", 0, 0, np.sin(0.3), np.cos(0.3)) if joint else bytes(16)
+    return data + bones
+
+
+def v2_packet(people: dict[int, tuple[int, Sequence[float]]], floor: Sequence[float]) -> bytes:
+    data = struct.pack("<q4f", 15_000_000, *floor)
+    for slot in range(6):
+        body, place = people.get(slot, (0, (0.0, 0.0, 0.0)))
+        data += struct.pack("<QQ", body, slot in people)
+        for joint in range(25):
+            data += struct.pack("<i3fi", joint, *place, joint % 3)
+        for joint in range(25):
+            turn = (0, 0, np.sin(0.3), np.cos(0.3)) if joint else (0, 0, 0, 0)
+            data += struct.pack("<i4f", joint, *turn)
+    return data
+
+
+def azure_packet(people: dict[int, Sequence[float]], up: Sequence[float]) -> bytes:
+    data = struct.pack("<QI3f", 1_500_000, len(people), *up)
+    for body, place in people.items():
+        data += struct.pack("<I", body)
+        for joint in range(32):
+            turn = (np.cos(0.3), 0, 0, np.sin(0.3)) if joint else (0, 0, 0, 0)
+            data += struct.pack("<3f4fI", *place, *turn, joint % 4)
+    return data + bytes(-len(data) % 1)
+
+
+PACKETS = {
+    "v1": (kinect_v1.SENSOR, v1_packet({2: (2, 7, (0.5, 0.25, 2.0))}, (0, 1, 0, 0.75))),
+    "v2": (kinect_v2.SENSOR, v2_packet({5: (7, (0.5, 0.25, 2.0))}, (0, 1, 0, 0.75))),
+    "azure": (kinect_azure.SENSOR, azure_packet({7: (-500.0, -250.0, 2000.0)}, (0, -1, 0))),
+}
+
+
+@pytest.mark.parametrize("kind", PACKETS)
+def test_a_body_stands_in_the_world_as_it_stood_before_the_camera(kind: str) -> None:
+    sensor, packet = PACKETS[kind]
+    (frame,) = KinectDecoder(sensor, level=False).feed(packet, 100.0)
+    seen = frame.confidence > 0
+    np.testing.assert_allclose(frame.positions[seen], [[-0.5, 0.25, -2.0]] * seen.sum(), atol=1e-6)
+    assert np.isnan(frame.positions[~seen]).all()
+    levels = [0.0, 0.5, 1.0, 1.0] if kind == "azure" else [0.0, 0.5, 1.0]
+    expected = [levels[joint % len(levels)] for joint in range(len(frame.confidence))]
+    np.testing.assert_array_equal(frame.confidence, expected)
+    assert (frame.performer, frame.time, frame.arrival) == (0, 100.0, 100.0)
+
+
+@pytest.mark.parametrize("kind", PACKETS)
+def test_a_zero_quaternion_is_no_turn_and_others_turn_with_the_axes(kind: str) -> None:
+    sensor, packet = PACKETS[kind]
+    (frame,) = KinectDecoder(sensor, level=False).feed(packet, 100.0)
+    assert frame.rotations is not None
+    assert np.isnan(frame.rotations[0]).all()
+    camera = Rotation.from_rotvec([0, 0, 0.6]).as_matrix()
+    found = Rotation.from_quat(frame.rotations[1:]).as_matrix()
+    np.testing.assert_allclose(found, [sensor.to_world @ camera] * len(found), atol=1e-6)
+
+
+def test_the_skeletons_are_the_three_sets_of_joints() -> None:
+    assert [len(sensor.skeleton.names) for sensor in SENSORS] == [20, 25, 32]
+    assert [s.skeleton for s in SENSORS] == [KINECT_V1, KINECT_V2, KINECT_AZURE]
+    for sensor in SENSORS:
+        assert np.linalg.det(sensor.to_world) == pytest.approx(1.0)
+
+
+def test_slots_are_no_identities() -> None:
+    decoder = KinectDecoder(kinect_v2.SENSOR)
+    near, far = (0.0, 0.0, 2.0), (1.5, 0.0, 2.5)
+    floor = (0, 1, 0, 1)
+    first = decoder.feed(v2_packet({0: (11, near), 1: (22, far)}, floor), 0.0)
+    moved = decoder.feed(v2_packet({4: (11, near), 0: (22, far)}, floor), 0.1)
+    for frames in (first, moved):
+        assert [frame.performer for frame in frames] == [0, 1]
+        assert frames[0].positions[1, 0] == pytest.approx(0.0)
+        assert frames[1].positions[1, 0] == pytest.approx(-1.5)
+
+
+def test_who_comes_back_with_another_id_has_the_same_number() -> None:
+    numbers = BodyNumbers()
+    here, there = np.array([0.0, 1.0, -2.0]), np.array([1.5, 1.0, -2.0])
+    assert numbers({11: here, 22: there}) == {11: 0, 22: 1}
+    assert numbers({}) == {}
+    assert numbers({33: there + 0.1}) == {33: 1}
+    assert numbers({33: there, 44: here}) == {33: 1, 44: 0}
+    assert numbers({33: there, 44: here, 55: np.full(3, np.nan)}) == {33: 1, 44: 0, 55: 2}
+
+
+def test_numbers_stay_small_however_many_ids_come() -> None:
+    numbers = BodyNumbers()
+    rng = np.random.default_rng(3)
+    for body in range(2000):
+        assert (
+            max(numbers({body: rng.normal(size=3), body + 10_000: rng.normal(size=3)}).values()) < 2
+        )
+
+
+def test_people_of_whom_only_the_place_is_known_are_left_out() -> None:
+    packet = v1_packet({0: (1, 3, (0, 0, 1.0)), 1: (2, 4, (0, 0, 2.0))}, (0, 0, 0, 0))
+    frames = KinectDecoder(kinect_v1.SENSOR).feed(packet, 0.0)
+    assert len(frames) == 1
+    assert np.nanmax(frames[0].positions[:, 2]) == pytest.approx(-2.0)
+
+
+def test_an_invalid_azure_id_is_nobody() -> None:
+    packet = azure_packet({0xFFFFFFFF: (0, 0, 1000.0)}, (0, -1, 0))
+    assert KinectDecoder(kinect_azure.SENSOR).feed(packet, 0.0) == []
+
+
+# -- the floor ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("degrees", [-30.0, 0.0, 25.0])
+def test_a_tilted_camera_s_view_is_levelled_with_the_floor_at_zero(degrees: float) -> None:
+    """A point whose height above the floor is known, seen by a camera that looks up or down."""
+    tilt = Rotation.from_euler("x", degrees, degrees=True).as_matrix()  # world to camera
+    up = tilt @ [0.0, 1.0, 0.0]
+    point = tilt @ (np.array([0.3, 0.9, 2.0]) - [0.0, 1.2, 0.0])  # 0.9 m high; the camera at 1.2
+    packet = v2_packet({1: (5, tuple(point))}, (*up, 1.2))
+    (frame,) = KinectDecoder(kinect_v2.SENSOR).feed(packet, 0.0)
+    np.testing.assert_allclose(frame.positions[1], [-0.3, 0.9, -2.0], atol=1e-6)
+    assert frame.rotations is not None
+    seen = Rotation.from_quat(frame.rotations[1]).as_matrix()
+    level = kinect_v2.SENSOR.to_world @ tilt.T @ Rotation.from_rotvec([0, 0, 0.6]).as_matrix()
+    np.testing.assert_allclose(seen, level, atol=1e-6)
+
+
+def test_an_accelerometer_levels_and_feet_find_the_floor() -> None:
+    tilt = Rotation.from_euler("x", 20.0, degrees=True).as_matrix()
+    up = tilt @ [0.0, -1.0, 0.0]  # camera axes have y down
+    foot = tilt @ [0.0, 800.0, 2000.0]  # 0.8 m below the camera
+    packet = azure_packet({3: tuple(foot)}, up)
+    table = bytearray(packet)
+    for joint in (21, 25):  # the feet, tracked as well as this SDK ever says
+        struct.pack_into("<I", table, 24 + 4 + 32 * joint + 28, 2)
+    decoder = KinectDecoder(kinect_azure.SENSOR)
+    (frame,) = decoder.feed(bytes(table), 0.0)
+    np.testing.assert_allclose(frame.positions[21], [0.0, 0.0, -2.0], atol=1e-6)
+
+
+def test_the_level_is_steady_and_follows_a_camera_that_is_moved() -> None:
+    level, rng = FloorLevel(), np.random.default_rng(2)
+    for _ in range(300):
+        noisy = np.array([0.0, 1.0, 0.0]) + rng.normal(scale=0.02, size=3)
+        level.learn(noisy / np.linalg.norm(noisy), 1.0 + rng.normal(scale=0.02))
+    assert np.degrees(np.arccos(level.turn[1, 1])) < 0.5
+    assert level.height == pytest.approx(1.0, abs=0.01)
+    for _ in range(600):
+        level.learn(np.array([0.0, 0.8, 0.6]), 1.5)
+    np.testing.assert_allclose(level.turn @ [0.0, 0.8, 0.6], [0.0, 1.0, 0.0], atol=1e-3)
+    assert level.height == pytest.approx(1.5, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    "up", [(0, 0, 0), (np.nan, 1, 0), (1, 0, 0), (0, -1, 0), (0, np.inf, 0), (0, 50, 0)]
+)
+def test_what_cannot_be_a_floor_is_passed_over(up: Sequence[float]) -> None:
+    level = FloorLevel()
+    level.learn(np.array(up, dtype=float), 1.3)
+    np.testing.assert_array_equal(level.turn, np.eye(3))
+    assert level.height == 1.0
+
+
+# -- hostile bytes --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", PACKETS)
+def test_what_is_no_frame_is_refused_and_counted(kind: str) -> None:
+    sensor, packet = PACKETS[kind]
+    decoder = KinectDecoder(sensor)
+    for data in (b"", b"\0", packet[:-1], packet + b"\0", bytes(100_000)):
+        assert decoder.feed(data, 0.0) == []
+    assert decoder.refused == 5
+    assert len(decoder.feed(packet, 0.0)) == 1
+
+
+@pytest.mark.parametrize("sensor", SENSORS)
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 3e38, 1e-42])
+def test_numbers_that_say_nothing_are_unseen(sensor: Sensor, value: float) -> None:
+    packet = next(packet for one, packet in PACKETS.values() if one is sensor)
+    floats = np.frombuffer(bytearray(packet), np.float32)
+    head = 6 if sensor is kinect_azure.SENSOR else 12
+    ids = floats.view(np.uint32).copy()
+    damaged = np.where((np.abs(floats) > 1e-3) & (np.arange(len(floats)) >= head), value, floats)
+    damaged = np.where(ids < 100, floats, damaged).astype(np.float32)
+    for frame in KinectDecoder(sensor).feed(damaged.tobytes(), 1.0):
+        seen = frame.confidence > 0
+        assert np.isfinite(frame.positions[seen]).all()
+        assert np.isnan(frame.positions[~seen]).all()
+
+
+def test_a_device_clock_that_jumps_back_never_makes_a_frame_later_than_its_arrival() -> None:
+    decoder = KinectDecoder(kinect_azure.SENSOR)
+    packet = bytearray(azure_packet({1: (0, 0, 1000.0)}, (0, -1, 0)))
+    for arrival, stamp in enumerate((10_000_000, 11_000_000, 5, 1_000_005, 2**63, 2**64 - 1)):
+        struct.pack_into("<Q", packet, 0, stamp)
+        (frame,) = decoder.feed(bytes(packet), float(arrival))
+        assert arrival - 1.5 <= frame.time <= arrival
+
+
+# -- whole way, through libraries with the makers' functions --------------------------------------
+
+
+def test_v1_is_opened_read_and_given_back(fake: ctypes.CDLL) -> None:
+    fake.fake_reset(5)
+    decoder = KinectDecoder(kinect_v1.SENSOR)
+    with watch(lambda: KinectV1(fake), lambda: decoder) as stream:
+        frames = take(stream, 5)
+    for step, frame in enumerate(frames, 1):
+        np.testing.assert_allclose(frame.positions[5], [-0.01 * step, 1.0, -2.0], atol=1e-6)
+        assert np.isnan(frame.positions[6]).all()
+        assert frame.confidence[4] == 0.5
+        assert frame.rotations is not None
+        assert np.isnan(frame.rotations[0]).all()
+        np.testing.assert_allclose(np.abs(frame.rotations[1]), [0, 1, 0, 0], atol=1e-6)
+    assert fake.fake_closed() == fake.fake_opened() == 1
+
+
+def test_v2_is_opened_read_and_given_back(fake: ctypes.CDLL) -> None:
+    fake.fake_reset(5)
+    decoder = KinectDecoder(kinect_v2.SENSOR)
+    with watch(lambda: KinectV2(fake), lambda: decoder) as stream:
+        frames = take(stream, 5)
+    for step, frame in enumerate(frames, 1):
+        height = 0.8 * (0.05 * 5 - 0.3) + 0.6 * 2.0 + 1.5  # the plane's own equation
+        assert frame.positions[5, 1] == pytest.approx(height, abs=1e-6)
+        assert frame.positions[5, 0] == pytest.approx(-0.01 * step, abs=1e-6)
+        assert frame.rotations is not None
+        assert np.isnan(frame.rotations[3]).all()
+        assert np.isfinite(frame.rotations[4]).all()
+    assert fake.fake_closed() == fake.fake_opened()  # every interface was released
+
+
+def test_azure_is_opened_read_and_given_back_and_no_queue_builds_up(fake: ctypes.CDLL) -> None:
+    fake.fake_reset(200)
+    decoder = KinectDecoder(kinect_azure.SENSOR)
+    setup = Setup(processing="cpu", smoothing=0.2)
+    with watch(lambda: KinectAzure(fake, fake, setup), lambda: decoder) as stream:
+        frames = take(stream, 20)
+    assert fake.fake_most_waiting() == 1
+    assert fake.fake_closed() == fake.fake_opened()  # captures and results, too
+    for frame in frames:
+        assert frame.positions[5, 1] == pytest.approx(-0.4 + 1.0, abs=1e-6)
+        assert frame.positions[5, 2] == pytest.approx(-2.0)
+        assert 0.0 < frame.positions[5, 0] - frame.performer <= 0.01 * 200 + 1e-6
+    assert {frame.performer for frame in frames} == {0, 1}
+
+
+def test_leapc_is_opened_read_and_given_back(fake: ctypes.CDLL) -> None:
+    fake.fake_reset(5)
+    with watch(lambda: LeapC(fake), LeapCDecoder) as stream:
+        frames = take(stream, 5)
+        skeleton = stream.skeleton
+    for step, frame in enumerate(frames, 1):
+        for side, x in (("right", 80.0 + 10 * step), ("left", -80.0 + 10 * step)):
+            place = frame.positions[skeleton.index(f"{side}_palm")]
+            np.testing.assert_allclose(place, leap_to_world([x, 200, 50]), atol=1e-6)
+            tip = frame.positions[skeleton.index(f"{side}_pinky_tip")]
+            np.testing.assert_allclose(tip, leap_to_world([x + 40, 200, -55]), atol=1e-6)
+    assert frames[0].rotations is not None
+    turned = np.isfinite(frames[0].rotations).all(axis=1)
+    without = {"hands", *(f"{side}_{joint}" for side in SIDES for joint in ("elbow", "wrist"))}
+    assert {skeleton.names[joint] for joint in np.flatnonzero(~turned)} == without
+    assert (frames[0].confidence == 0.5).all()
+    assert frames[-1].time - frames[0].time <= 4 * 0.009 + 1e-6
+    assert fake.fake_closed() == fake.fake_opened() == 1
+
+
+@pytest.mark.parametrize("kind", ["v1", "azure", "leap"])
+def test_a_sensor_that_is_unplugged_comes_back(
+    kind: str, fake: ctypes.CDLL, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sdk_library, "RETRY", 0.01)
+    sources: dict[str, Callable[[], SensorSource]] = {
+        "v1": lambda: KinectV1(fake),
+        "azure": lambda: KinectAzure(fake, fake, Setup(processing="cpu")),
+        "leap": lambda: LeapC(fake),
+    }
+    decoders: dict[str, Callable[[], Decoder]] = {
+        "v1": lambda: KinectDecoder(kinect_v1.SENSOR),
+        "azure": lambda: KinectDecoder(kinect_azure.SENSOR),
+        "leap": LeapCDecoder,
+    }
+    fake.fake_reset(1_000_000)
+    with watch(sources[kind], decoders[kind]) as stream:
+        take(stream, 2)
+        fake.fake_plug(0)
+        assert until(lambda: bool(stream.traffic.trouble))
+        assert "\n" not in stream.traffic.trouble
+        stream.poll()
+        fake.fake_plug(1)
+        take(stream, 2)
+        assert until(lambda: not stream.traffic.trouble)
+
+
+@pytest.mark.parametrize(
+    ("make", "says"),
+    [
+        (KinectV1, "kinect://v1: no sensor answers"),
+        (KinectV2, "kinect://v2: no sensor answers"),
+        (lambda fake: KinectAzure(fake, fake), "kinect://azure: camera 0 does not answer"),
+    ],
+)
+def test_a_sensor_that_is_not_there_is_said_in_one_line(
+    make: Callable[[ctypes.CDLL], SensorSource], says: str, fake: ctypes.CDLL
+) -> None:
+    fake.fake_reset(1)
+    fake.fake_plug(0)
+    with pytest.raises(InputError, match=says) as caught:
+        make(fake)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_tracker_that_cannot_be_made_gives_the_camera_back(fake: ctypes.CDLL) -> None:
+    fake.fake_reset(1)
+    with pytest.raises(InputError, match="processing=cpu"):
+        KinectAzure(fake, fake, Setup(processing="cuda"))
+    assert fake.fake_closed() == fake.fake_opened() == 1
+
+
+# -- addresses ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("url", "says"),
+    [
+        ("kinect://v1", "Kinect10.dll"),
+        ("kinect://v2", "Kinect20.dll"),
+        ("kinect://azure?processing=cpu&smoothing=0.5&device=1&depth=wfov", "k4a is not here"),
+        ("leap://", r"leap\+ws://"),
+        ("kinect://v3", "kinect://v1, kinect://v2, kinect://azure"),
+        ("kinect://azure?processing=abacus", "gpu or cpu"),
+        ("kinect://azure?smoothing=2", "from 0 to 1"),
+        ("kinect://v2?seated=on", "'seated' is not known"),
+        ("kinect://v1?floor=carpet", "level or camera"),
+        ("leap://192.168.0.2", "leap\\+ws://HOST:PORT"),
+        ("leap://?mode=hat", "desktop or screentop"),
+    ],
+)
+def test_an_address_that_cannot_be_opened_is_one_clear_line(url: str, says: str) -> None:
+    with pytest.raises(InputError, match=says) as caught:
+        open_stream(url)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.fixture(autouse=True)
+def _no_makers_library(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Should a maker's library be installed where the tests run, they must not open it."""
+    for module in (kinect_v1, kinect_v2, kinect_azure, leapc):
+        monkeypatch.setattr(module, "LIBRARIES", ("no-such-library",))
+
+
+@pytest.mark.parametrize(("found", "flags"), [(True, [8]), (False, [])])
+def test_on_windows_a_library_s_own_needs_may_lie_beside_it(
+    found: bool, flags: list[int], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    loaded: list[tuple[str, list[int]]] = []
+    where = str(tmp_path / "k4a.dll") if found else None
+
+    def windows(name: str, **more: int) -> object:
+        loaded.append((name, list(more.values())))
+        return fake
+
+    monkeypatch.setattr("ctypes.WinDLL", windows, raising=False)
+    monkeypatch.setattr("ctypes.util.find_library", lambda _name: where)
+    assert sdk_library.load_library(["k4a.dll"], "missing") is fake
+    assert loaded == [(where or "k4a.dll", flags)]

@@ -1,0 +1,489 @@
+"""NI mate and its kin as they write their joints: told apart, upright, nothing evaluated."""
+
+from __future__ import annotations
+
+import socket
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+from pythonosc.osc_message import OscMessage
+from pythonosc.udp_client import SimpleUDPClient
+from scipy.spatial.transform import Rotation
+
+from devices.bodies.anatomy import available_presets
+from devices.errors import InputError
+from devices.kinect.joints import KINECT_V2
+from devices.osc.nimate import FORMATS, INFERRED, MOST_USERS, NimateDecoder
+from devices.osc.openni_joints import OPENNI, joint_called
+from devices.skeleton import SkeletonFrame
+from devices.stream import open_stream
+from devices.transport.live_stream import LiveStream
+from tests.devices.studio_senders import (
+    NIMATE,
+    STEP,
+    SYNC,
+    animata,
+    kinect2,
+    nimate,
+    osceleton,
+    posed,
+    skelecaster,
+)
+from tests.devices.vmc_sender import bundle, message
+
+TORSO = np.linalg.norm(
+    OPENNI.rest_positions[OPENNI.index("Neck")] - OPENNI.rest_positions[OPENNI.index("Pelvis")]
+)
+TURNS = Rotation.from_euler("yx", np.linspace(0.1, 1.0, 32).reshape(16, 2))
+FAR = np.array([0.4, -0.3, -2.5])  # before the sensor, which stands higher than the hips
+
+
+def joint(name: str) -> int:
+    return OPENNI.index(name)
+
+
+def body(k: int = 0) -> np.ndarray:
+    """A pose whose pelvis is the middle of its hips, as the programs that have none leave it."""
+    places = posed(OPENNI, k)
+    places[joint("Pelvis")] = (places[joint("LeftHip")] + places[joint("RightHip")]) / 2.0
+    return places
+
+
+def standing(places: np.ndarray) -> np.ndarray:
+    """On the floor, with the torso of the built-in body."""
+    torso = np.linalg.norm(places[joint("Neck")] - places[joint("Pelvis")])
+    return (places - (0.0, places[:, 1].min(), 0.0)) * TORSO / torso
+
+
+def fed(
+    decoder: NimateDecoder, frames: Sequence[Sequence[OscMessage]], *, bundled: bool = True
+) -> list[SkeletonFrame]:
+    """What a decoder makes of frames that come one after another, 60 a second."""
+    made: list[SkeletonFrame] = []
+    for k, said in enumerate(frames):
+        datagrams = [bundle(said)] if bundled else [one.dgram for one in said]
+        for n, data in enumerate(datagrams):
+            made += decoder.feed(data, 10.0 + k * STEP + n * 1e-5)
+    return made
+
+
+Say = Callable[[np.ndarray], list[OscMessage]]
+WAYS: dict[str, Say] = {
+    "basic": lambda p: nimate(p, what="place"),
+    "basic and orientation": lambda p: nimate(p, TURNS),
+    "with a slash": lambda p: nimate(p, shape="/skeleton_{name}"),
+    "ten units a metre": lambda p: nimate(10.0 * p, what="place"),
+    "millimetres": lambda p: nimate(1000.0 * p, what="place"),
+    "OSCeleton": osceleton,
+    "OSCeleton, mirrored": lambda p: osceleton(p, mirrored=True),
+    "OSCeleton, raw": lambda p: osceleton(p, raw=True),
+    "OSCeleton, for Quartz Composer": lambda p: [
+        message(f"/joint/{one.params[0]}/{one.params[1]}", *one.params[2:]) for one in osceleton(p)
+    ],
+}
+
+
+@pytest.mark.parametrize("way", WAYS)
+@pytest.mark.parametrize("bundled", [True, False], ids=["bundles", "bare"])
+def test_every_way_to_say_it_is_the_same_body(way: str, bundled: bool) -> None:
+    frames = fed(NimateDecoder(), [WAYS[way](body(k) + FAR) for k in range(6)], bundled=bundled)
+    assert len(frames) >= 5
+    for frame, k in zip(frames, range(6), strict=False):
+        wanted = standing(body(k) + FAR)
+        assert frame.positions[:, 1] == pytest.approx(wanted[:, 1], abs=2e-3)
+        assert frame.positions == pytest.approx(wanted, abs=2e-3)
+        assert (frame.confidence == 1.0).all()
+        assert frame.performer == 0
+        assert frame.time == frame.arrival
+
+
+def test_left_stays_left_and_faces_forward() -> None:
+    for say in WAYS.values():
+        frame = fed(NimateDecoder(), [say(OPENNI.rest_positions + FAR)] * 3)[-1]
+        at = dict(zip(OPENNI.names, frame.positions, strict=True))
+        left, up = at["LeftHand"] - at["RightHand"], at["Head"] - at["Pelvis"]
+        assert left[0] > 1.0
+        assert up[1] > 0.5
+        assert at["LeftKnee"][2] > at["LeftFoot"][2]  # a knee is before the ankle
+        forward = at["LeftKnee"] - at["LeftFoot"]
+        assert np.linalg.det([left, up, forward]) > 0.0
+        assert frame.positions[:, 1].min() == pytest.approx(0.0, abs=1e-6)
+
+
+def test_orientations_are_joint_to_world() -> None:
+    frame = fed(NimateDecoder(), [nimate(body(k) + FAR, TURNS) for k in range(3)])[-1]
+    assert frame.rotations is not None
+    told = [joint(name) for name in NIMATE]
+    errors = (Rotation.from_quat(frame.rotations[told]) * TURNS[told].inv()).magnitude()
+    assert errors.max() < 1e-5
+
+
+def test_orientations_alone_go_through_forward_kinematics() -> None:
+    turns = {"LeftShoulder": Rotation.from_euler("z", 1.0), "LeftElbow": Rotation.identity()}
+    rotations = Rotation.concatenate([turns.get(n, Rotation.identity()) for n in OPENNI.names])
+    rest = OPENNI.rest_positions.copy()
+    said = [nimate(rest, rotations, what="turn", user=k // 3) for k in range(3)]
+    frame = fed(NimateDecoder(), said)[-1]
+    upper = rest[joint("LeftElbow")] - rest[joint("LeftShoulder")]
+    elbow = rest[joint("LeftShoulder")] + turns["LeftShoulder"].apply(upper)
+    hand = elbow + rest[joint("LeftHand")] - rest[joint("LeftElbow")]
+    assert frame.positions[joint("LeftElbow")] == pytest.approx(elbow, abs=1e-6)
+    assert frame.positions[joint("LeftHand")] == pytest.approx(hand, abs=1e-6)
+    assert frame.positions[joint("RightFoot")] == pytest.approx(rest[joint("RightFoot")], abs=1e-6)
+    assert frame.confidence[joint("LeftHand")] == 1.0
+    assert frame.confidence[joint("Pelvis")] == INFERRED
+
+
+def test_the_mark_ends_a_frame_and_nothing_else_does() -> None:
+    decoder = NimateDecoder()
+    frames: list[SkeletonFrame] = []
+    for k in range(10):
+        said = nimate(body(k) + FAR, what="place")
+        at = 10.0 + k * STEP
+        frames += decoder.feed(bundle(said[:7]), at)
+        frames += decoder.feed(bundle(said[7 if k % 2 else 8 :]), at + 0.0005)
+        assert len(frames) == k
+        frames += decoder.feed(SYNC.dgram, at + 0.001)
+        assert len(frames) == k + 1
+    seen = [int(np.count_nonzero(frame.confidence)) for frame in frames]
+    assert set(seen) == {15, 16}
+    assert decoder.refused == 0
+
+
+def test_a_mark_without_a_slash_and_one_that_was_lost() -> None:
+    decoder = NimateDecoder()
+    mark = message("NI_mate_sync", 1)
+    frames = [
+        frame
+        for k in range(20)
+        for said in (nimate(body(k) + FAR, what="place"), [mark] if k % 5 else [])
+        for frame in (decoder.feed(bundle(said), 10.0 + k * STEP) if said else ())
+    ]
+    assert len(frames) == 20
+    assert all((frame.confidence == 1.0).all() for frame in frames)
+
+
+@pytest.mark.parametrize(
+    "shape", ["{name}_{user}", "/{user}/{name}", "/user{user}/{name}", "{name}"]
+)
+def test_user_ids_in_addresses_and_arguments(shape: str) -> None:
+    said = [
+        [
+            *nimate(body(k) + FAR, shape=shape, user=4),
+            *nimate(body(k) + FAR + (1.5, 0.0, 0.0), shape=shape, user=9),
+        ]
+        for k in range(5)
+    ]
+    frames = fed(NimateDecoder(), said)
+    assert [frame.performer for frame in frames] == [0, 1] * 5
+    apart = frames[-1].positions - frames[-2].positions
+    assert apart == pytest.approx(np.tile([1.5, 0.0, 0.0], (16, 1)), abs=0.01)
+
+
+def test_users_keep_their_numbers_and_the_lost_are_forgotten() -> None:
+    decoder = NimateDecoder()
+    two = [[*osceleton(body(k) + FAR, 1), *osceleton(body(k) + FAR + 1, 2)] for k in range(5)]
+    frames = fed(decoder, two)
+    assert [frame.performer for frame in frames] == [0, 1] * 5
+    decoder.feed(bundle([message("/lost_user", 1)]), 10.2)
+    later: list[SkeletonFrame] = []
+    for k in range(5):
+        data = bundle([*osceleton(body(k) + FAR + 1, 2), *osceleton(body(k) + FAR, 7)])
+        later += decoder.feed(data, 10.3 + k * STEP)
+    assert {frame.performer for frame in later} == {0, 1}
+    assert later[-1].performer == 0 or later[-2].performer == 0
+    other = next(f for f in later[::-1] if f.performer == 1)
+    assert other.positions[0, 0] == pytest.approx(standing(body(4) + FAR + 1)[0, 0], abs=0.02)
+
+
+def test_no_more_users_than_there_are_places_for() -> None:
+    decoder = NimateDecoder()
+    for user in range(1000):
+        decoder.feed(bundle(osceleton(body() + FAR, user)), 10.0 + user * 1e-3)
+    assert len(decoder._users) == MOST_USERS
+    assert decoder.refused >= 1000 - 2 * MOST_USERS
+    frames = [
+        f for k in range(3) for f in decoder.feed(bundle(osceleton(body(k) + FAR)), 30.0 + k * STEP)
+    ]
+    (performer,) = {frame.performer for frame in frames}
+    assert performer < MOST_USERS
+
+
+def test_animata_s_pictures_stand_upright_whichever_way_they_run() -> None:
+    for mirror in (1.0, -1.0):
+        for down in (1.0, -1.0):
+            said = [animata(body(k) * (mirror, down, 0.0), user=3) for k in range(4)]
+            frame = fed(NimateDecoder(), said)[-1]
+            wanted = standing(body(2) * (1.0, 1.0, 0.0))
+            middle = frame.positions[joint("Pelvis")] - wanted[joint("Pelvis")]
+            assert middle[1] == pytest.approx(0.0, abs=5e-3)
+            assert frame.positions - middle == pytest.approx(wanted, abs=5e-3)
+            assert (frame.positions[:, 2] == 0.0).all()
+
+
+def test_omni_is_a_list_without_names() -> None:
+    order = [joint(n) for n in OPENNI.names if n != "Pelvis"]
+    order = [*order[2::-1], *order[3:6], *order[9:12], *order[6:9], *order[12:]]
+    values = [(body(k)[order] + FAR) @ np.diag([-1.0, 1.0, -1.0]) for k in range(4)]
+    frame = fed(NimateDecoder(), [[message("skeleton", *v.ravel().tolist())] for v in values])[-1]
+    assert frame.positions == pytest.approx(standing(body(3) + FAR), abs=2e-3)
+    names = [OPENNI.names[j] for j in order[::-1]]
+    omni = tuple(j for name in names if (j := joint_called(name)) is not None)
+    told = NimateDecoder("nimate", omni=omni)
+    frame = fed(told, [[message("/skeleton", *v[::-1].ravel().tolist())] for v in values])[-1]
+    assert frame.positions == pytest.approx(standing(body(3) + FAR), abs=2e-3)
+    assert NimateDecoder().feed(message("skeleton", *[0.5] * 7).dgram, 1.0) == []
+
+
+def test_a_given_scale_is_believed() -> None:
+    said = [nimate(100.0 * (body(k) + FAR), what="place") for k in range(3)]
+    frame = fed(NimateDecoder(scale=0.01), said)[-1]
+    places = body(2) + FAR
+    wanted = places - (0.0, places[:, 1].min(), 0.0)
+    assert frame.positions == pytest.approx(wanted, abs=2e-3)
+
+
+def kinect_body(k: int = 0) -> np.ndarray:
+    return posed(KINECT_V2, k) + FAR
+
+
+@pytest.mark.parametrize("bundled", [True, False], ids=["bundles", "bare"])
+def test_kinect_s_joints_are_metres(bundled: bool) -> None:
+    said = [kinect2(kinect_body(k)) for k in range(6)]
+    full = fed(NimateDecoder("kinect2"), said, bundled=bundled)
+    lowest = kinect_body()[:, 1].min()
+    assert len(full) >= 5
+    for k, frame in enumerate(full):
+        wanted = kinect_body(k) - (0.0, lowest, 0.0)
+        assert frame.positions == pytest.approx(wanted, abs=1e-5)
+    some = fed(NimateDecoder(), said, bundled=bundled)[-1]
+    last = len(full) - 1
+    for ours, theirs in (("LeftHand", "HandLeft"), ("RightFoot", "AnkleRight")):
+        wanted = kinect_body(last)[KINECT_V2.index(theirs)] - (0.0, lowest, 0.0)
+        assert some.positions[joint(ours)] == pytest.approx(wanted, abs=1e-5)
+
+
+def test_hands_of_kinect_are_no_joints() -> None:
+    decoder = NimateDecoder()
+    assert decoder.feed(message("/bodies/7/hands/Left", "Open", "High").dgram, 1.0) == []
+    assert decoder.refused == 0
+
+
+def test_skelecaster_s_bodies_come_at_once() -> None:
+    decoder = NimateDecoder("skelecaster")
+    one, two = kinect_body(), kinect_body(5) + np.array([1.5, 0.0, 0.0])
+    states = (2, 1, 0, *[2] * 22)
+    frames = decoder.feed(skelecaster({2**63 + 5: one, 17: two}, states), 3.0)
+    assert [frame.performer for frame in frames] == [0, 1]
+    assert frames[0].confidence.tolist() == [1.0, 0.5, 0.0, *[1.0] * 22]
+    assert np.isnan(frames[0].positions[2]).all()
+    lowest = np.delete(one[:, 1], 2).min()
+    assert frames[0].positions[3] == pytest.approx(one[3] - (0.0, lowest, 0.0), abs=1e-5)
+    again = decoder.feed(skelecaster({17: two, 3: one}, states), 3.5)
+    assert [frame.performer for frame in again] == [1, 0]
+    (told,) = NimateDecoder().feed(skelecaster({1: one}), 3.0)
+    assert told.positions.shape == (16, 3)
+    assert NimateDecoder().feed(skelecaster({}), 3.0) == []
+
+
+@pytest.mark.parametrize("data", [skelecaster({1: kinect_body()})[:-1], b"\1\1\2", b"\1\1\2\xff"])
+def test_a_skelecaster_that_is_too_short_is_refused(data: bytes) -> None:
+    decoder = NimateDecoder()
+    assert decoder.feed(data, 1.0) == []
+    assert decoder.refused == 1
+
+
+def test_one_format_hears_only_itself() -> None:
+    told: dict[str, bytes] = {
+        "nimate": bundle(nimate(body() + FAR)),
+        "osceleton": bundle(osceleton(body() + FAR)),
+        "animata": bundle(animata(body())),
+        "kinect2": bundle(kinect2(kinect_body())),
+        "skelecaster": skelecaster({1: kinect_body()}),
+    }
+    assert set(told) == set(FORMATS)
+    for format in FORMATS:
+        for other, data in told.items():
+            decoder = NimateDecoder(format)
+            frames = [f for k in range(3) for f in decoder.feed(data, 1.0 + 0.02 * k)]
+            heard = other == format or (format == "nimate" and other in ("osceleton", "animata"))
+            assert bool(frames) == heard, (format, other)
+
+
+def test_nimate_may_write_as_osceleton_does_in_its_own_axes() -> None:
+    places = body() + FAR
+    said = [
+        message("/joint", name, 1, *(places[joint(ours)] * (-1.0, 1.0, -1.0)).tolist())
+        for ours, name in NIMATE.items()
+    ]
+    frame = fed(NimateDecoder("nimate"), [said] * 3)[-1]
+    assert frame.positions == pytest.approx(standing(places), abs=2e-3)
+
+
+def test_joints_that_are_not_told_are_not_seen() -> None:
+    said = [osceleton(body(k) + FAR) for k in range(6)]
+    said[3] = said[3][:9]
+    frames = fed(NimateDecoder(), said)
+    partial = [frame for frame in frames if not (frame.confidence == 1.0).all()]
+    assert len(partial) == 1
+    assert np.isnan(partial[0].positions[partial[0].confidence == 0.0]).all()
+
+
+@pytest.mark.parametrize("lost", [1, 10, 300])
+def test_a_hand_that_is_lost_for_a_while_holds_nothing_up(lost: int) -> None:
+    said = [osceleton(body(k % 50) + FAR) for k in range(lost + 40)]
+    for k in range(20, 20 + lost):
+        said[k] = [one for one in said[k] if one.params[0] != "l_hand"]
+    decoder = NimateDecoder()
+    frames = fed(decoder, said)
+    gone = [bool(frame.confidence[joint("LeftHand")] == 0.0) for frame in frames]
+    assert len(frames) == len(said)
+    assert sum(gone) == lost
+    assert not gone[-1]
+    assert decoder.refused == 0
+
+
+def test_a_future_timetag_waits_for_nobody() -> None:
+    decoder = NimateDecoder()
+    late = [bundle(osceleton(body(k) + FAR), timetag=2e9) for k in range(3)]
+    assert sum(len(decoder.feed(data, 1.0 + k * STEP)) for k, data in enumerate(late)) == 3
+
+
+def test_a_datagram_that_comes_twice_is_one() -> None:
+    decoder = NimateDecoder()
+    frames: list[SkeletonFrame] = []
+    for k in range(10):
+        for one in osceleton(body(k) + FAR):
+            for copy in (0.0, 1e-4):
+                frames += decoder.feed(one.dgram, 10.0 + k * STEP + copy)
+    assert len(frames) >= 9
+    assert all((frame.confidence == 1.0).all() for frame in frames)
+    assert decoder.refused == 10 * 15
+
+
+def test_a_joint_that_comes_again_after_others_ends_no_frame() -> None:
+    decoder = NimateDecoder()
+    frames: list[SkeletonFrame] = []
+    for k in range(10):
+        said = osceleton(body(k) + FAR)
+        for n, one in enumerate([*said[:5], said[2], *said[5:9], said[0], *said[9:]]):
+            frames += decoder.feed(one.dgram, 10.0 + k * STEP + n * 1e-5)
+    assert len(frames) >= 9
+    assert all((frame.confidence == 1.0).all() for frame in frames)
+    assert decoder.refused == 20
+
+
+EVIL = [
+    "@__import__('os').abort()",
+    "?raise SystemExit",
+    "/@exit()",
+    "@bpy.ops.wm.quit_blender()",
+]
+
+
+@pytest.mark.parametrize("address", EVIL)
+def test_nothing_is_evaluated(address: str) -> None:
+    decoder = NimateDecoder()
+    for values in ((), (1.0, 2.0, 3.0), (1.0,) * 7, ("x",)):
+        assert decoder.feed(message(address, *values).dgram, 1.0) == []
+
+
+BAD = [
+    message("Left_Hand", 1.0, 2.0),
+    message("Left_Hand", 1.0, 2.0, 3.0, 4.0, 5.0),
+    message("Left_Hand", "a", 1.0, 2.0, 3.0),
+    message("Left_Hand", 1, 2, 3),
+    message("Left_Hand", float("nan"), 0.0, 0.0),
+    message("Left_Hand", float("inf"), 0.0, 0.0),
+    message("Left_Hand", 1e30, 0.0, 0.0),
+    message("/joint", 1, 1.0, 2.0, 3.0),
+    message("/joint", "l_hand"),
+    message("/joint", "l_hand", 1, 1.0),
+    message("/joint", "l_hand", 1, float("nan"), 0.0, 0.0),
+    message("/bodies/5/joints/HandLeft", 1.0, 2.0),
+    message("/bodies/5/joints/HandLeft", "a", "b", "c"),
+    message("skeleton", *[1.0] * 44),
+    message("skeleton", *[1.0] * 12),
+]
+
+
+@pytest.mark.parametrize("bad", BAD, ids=lambda one: f"{one.address} {one.params}"[:40])
+def test_malformed_messages_are_left_out_and_counted(bad: OscMessage) -> None:
+    decoder = NimateDecoder()
+    said = [[bad, *nimate(body(k) + FAR)] for k in range(3)]
+    frames = fed(decoder, said)
+    assert decoder.refused == 3
+    assert all((frame.confidence == 1.0).all() for frame in frames)
+    assert len(frames) >= 2
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        message("/hello_world", 1.0, 2.0, 3.0),
+        message("/joint", "tail", 1, 0.5, 0.5, 2.0),
+        message("/new_user", 1),
+        message("/new_skel", 1),
+        message("/user/1", 0.5, 0.5, 2.0),
+        message("/orient/l_knee/1", *[1.0] * 9),
+        message("Left_Hand", 0.0, 0.0, 0.0, 0.0),
+        message("/" + "x" * 5000, 1.0, 2.0, 3.0),
+        message("/bodies/5/joints/Tail", 1.0, 2.0, 3.0),
+    ],
+    ids=lambda one: str(one.address)[:30],
+)
+def test_other_messages_are_no_fault(other: OscMessage) -> None:
+    decoder = NimateDecoder()
+    fed(decoder, [[other, *osceleton(body(k) + FAR)] for k in range(3)])
+    assert decoder.refused == 0
+
+
+def test_a_frame_without_a_torso_or_a_body_flat_as_a_point() -> None:
+    for places in (np.zeros((16, 3)), np.full((16, 3), 1e-9), body() * 1e4):
+        for say in (nimate, osceleton, animata):
+            frames = fed(NimateDecoder(), [say(places + k * 1e-3) for k in range(3)])
+            for frame in frames:
+                seen = frame.confidence > 0.0
+                assert np.isfinite(frame.positions[seen]).all()
+                assert np.isnan(frame.positions[~seen]).all()
+    only = [one for one in osceleton(body() + FAR) if one.params[0] in ("l_hand", "l_elbow")]
+    frames = fed(NimateDecoder(), [only, only, only])
+    assert all(np.count_nonzero(frame.confidence) == 2 for frame in frames)
+
+
+def test_the_presets_work() -> None:
+    wanted = {"whole", "upper", "arms", "legs", "left-arm", "right-arm", "right-leg", "spine"}
+    assert wanted <= set(available_presets(OPENNI))
+    assert wanted <= set(available_presets(NimateDecoder("kinect2").skeleton))
+
+
+def test_through_a_socket_from_python_osc_s_own_client() -> None:
+    with open_stream("nimate://127.0.0.1:0") as stream:
+        assert isinstance(stream, LiveStream)
+        port: int = stream.transport.port  # type: ignore[attr-defined]
+        with SimpleUDPClient("127.0.0.1", port) as client:
+            for one in nimate(body() + FAR, what="place"):
+                client.send_message(one.address, one.params)
+            client.send_message("/NI_mate_sync", 1.0)
+        assert stream.wait(30.0)
+        (frame,) = stream.poll()
+        with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
+            sender.sendto(skelecaster({1: kinect_body()}), ("127.0.0.1", port))
+        assert stream.wait(30.0)
+    assert frame.positions == pytest.approx(standing(body() + FAR), abs=2e-3)
+
+
+def test_addresses() -> None:
+    with open_stream("nimate://127.0.0.1:0?format=kinect2") as stream:
+        assert stream.skeleton is KINECT_V2
+    with open_stream("nimate://127.0.0.1:0?format=nimate&scale=0.1&joints=head,neck,l_hand"):
+        pass
+    for query, why in (
+        ("format=tarot", "osceleton"),
+        ("scale=-1", "above 0"),
+        ("joints=head,tail", "names of different joints"),
+        ("joints=head,head", "names of different joints"),
+    ):
+        with pytest.raises(InputError, match=why):
+            open_stream(f"nimate://127.0.0.1:0?{query}")

@@ -1,0 +1,74 @@
+"""A limb whose performer is lost lets go softly, and takes hold softly again."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from runtime.driving.limb_release import FIRMEST, LET_GO, LOOSEST, PATIENCE, TAKE_HOLD, LimbRelease
+from runtime.driving.mapping import Mapping
+from runtime.driving.performer import Performer, rest_state
+from runtime.puppet.puppet import Puppet, RootMotion
+from solvers.deform.handles import HARD
+from tests.runtime.stick_figures import ARMS, BODY, frame, make_figure, pose, waving
+
+
+def held(grip: LimbRelease, seen: list[bool], seconds: float, start: float) -> list[np.ndarray]:
+    weights = []
+    for k in range(round(seconds * 60.0)):
+        grip.follow(start + k / 60.0, np.array(seen))
+        weights.append(grip.weights)
+    return weights
+
+
+def test_what_is_seen_is_held_firmly():
+    grip = LimbRelease(2)
+    assert all((w == HARD).all() for w in held(grip, [True, True], 3.0, 0.0))
+
+
+def test_a_flicker_changes_nothing():
+    grip = LimbRelease(1)
+    held(grip, [True], 0.5, 0.0)
+    for start in (0.5, 1.0, 1.5):  # however often
+        assert all((w == HARD).all() for w in held(grip, [False], 0.9 * PATIENCE, start))
+        held(grip, [True], 0.25, start + 0.25)
+
+
+def test_a_lost_limb_lets_go_step_by_step_and_takes_hold_faster():
+    grip = LimbRelease(2)
+    held(grip, [True, True], 0.5, 0.0)
+    gone = np.array(held(grip, [False, True], PATIENCE + LET_GO + 0.2, 0.5))
+    assert (gone[:, 1] == HARD).all(), "the other limb is not concerned"
+    soft = gone[np.isfinite(gone[:, 0]), 0]
+    assert (np.diff(soft) <= 0.0).all()
+    assert soft[0] > 0.3 * FIRMEST
+    assert soft[-1] == pytest.approx(LOOSEST)
+    assert (soft[:-1] / soft[1:]).max() < 2.1
+    back = np.array(held(grip, [True, True], TAKE_HOLD + 0.1, 0.5 + len(gone) / 60.0))[:, 0]
+    assert (np.diff(back[np.isfinite(back)]) >= 0.0).all()
+    assert back[-1] == HARD
+
+
+def test_a_limb_that_comes_back_elsewhere_does_not_snap():
+    """The hand's largest step on coming back is far smaller than the performer's."""
+    figure = make_figure()
+    puppet, performer = Puppet(figure), Performer(BODY)
+    start = performer.follow(frame(pose()))
+    puppet.take(Mapping(tuple(ARMS)), rest_state(start), np.eye(3), RootMotion())
+    arm = list(ARMS[0].source[1:])
+    raised = waving(9)[4]
+    steps, before = [], None
+    for k in range(240):
+        positions = np.array(pose() if k < 60 else raised)
+        if 30 <= k < 180:
+            positions[arm] = np.nan
+        puppet.follow(performer.follow(frame(positions, k / 60.0)))
+        vertices = puppet.deform().vertices.copy()
+        if before is not None:
+            steps.append(np.linalg.norm(vertices - before, axis=1).max())
+        before = vertices
+    coming_back = np.array(steps[178:])
+    whole_way = np.linalg.norm(raised[arm[-1]] - pose()[arm[-1]])
+    assert whole_way > 0.4
+    assert coming_back.sum() > 0.5 * whole_way, "it does come back"
+    assert coming_back.max() < 0.25 * whole_way

@@ -1,0 +1,257 @@
+"""Who drives what: matching, accepting, stepping through matches, and looking for a rest state."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from devices.errors import InputError
+from runtime.driving.mapping import Drive, Mapping
+from runtime.driving.match_session import Choices, MatchSession
+from runtime.driving.performer import Performer, Pose
+from runtime.puppet.puppet import Puppet
+from tests.runtime.stick_figures import (
+    ARMS,
+    BODY,
+    FRONT_VIEW,
+    T_POSE,
+    frame,
+    make_figure,
+    pose,
+    waving,
+)
+
+FIGURE = make_figure()
+UPSIDE_DOWN = {"SpineBase": (0.0, 0.0, math.pi)}
+
+
+@pytest.fixture(scope="module")
+def puppet() -> Puppet:
+    return Puppet(FIGURE)
+
+
+class Rehearsal:
+    """A performer, a puppet at rest and a director, fed with poses at a tenth of a second."""
+
+    def __init__(
+        self,
+        puppet: Puppet,
+        choices: Choices,
+        by_hand: Mapping | None = None,
+        source: str = "whole",
+    ) -> None:
+        puppet.rest()
+        puppet.show(Mapping(()))
+        self.puppet = puppet
+        self.performer = Performer(BODY, source)
+        self.match_session = MatchSession(
+            self.performer, [puppet], lambda: FRONT_VIEW, choices, [by_hand]
+        )
+        self.time = 0.0
+
+    def strike(self, positions: np.ndarray) -> tuple[Drive, ...]:
+        captured = frame(positions, self.time)
+        self.performer.follow(captured)
+        self.match_session.direct(captured)
+        self.time += 0.1
+        return self.drives
+
+    @property
+    def drives(self) -> tuple[Drive, ...]:
+        return self.puppet.mapping.drives
+
+    def moves(self, positions: np.ndarray) -> float:
+        """How far the puppet goes from rest when the performer does this [m]."""
+        self.puppet.follow(self.performer.follow(frame(positions, self.time)))
+        return float(np.abs(self.puppet.deform().vertices - FIGURE.vertices).max())
+
+
+def seen(positions: np.ndarray) -> Pose:
+    return Performer(BODY).follow(frame(positions))
+
+
+def test_without_patience_the_first_pose_performs_at_once(puppet: Puppet) -> None:
+    show = Rehearsal(puppet, Choices())
+    assert show.match_session.matching
+    drives = show.strike(pose(T_POSE))
+    assert not show.match_session.matching
+    assert len(drives) >= 4
+    assert show.moves(pose(T_POSE)) < 1e-9, "the pose struck is the rest state"
+    assert show.moves(pose()) > 0.2
+
+
+def test_with_endless_patience_it_waits_to_be_accepted(puppet: Puppet) -> None:
+    show = Rehearsal(puppet, Choices(patience=math.inf))
+    show.match_session.accept()
+    assert show.match_session.matching, "there is nothing to accept yet"
+    for _ in range(50):
+        assert show.strike(pose(T_POSE))
+    assert show.match_session.matching
+    assert show.moves(pose()) < 1e-9, "shown, and not driven"
+    show.strike(pose(T_POSE))
+    show.match_session.accept()
+    assert not show.match_session.matching
+    assert show.moves(pose()) > 0.2
+
+
+def test_a_match_performs_when_it_has_stood_for_as_long_as_asked(puppet: Puppet) -> None:
+    show = Rehearsal(puppet, Choices(patience=0.45))
+    waited = 0
+    while show.match_session.matching:
+        show.strike(pose(T_POSE))
+        waited += 1
+    assert waited == 6  # at 0.0, 0.1 ... 0.5
+    show = Rehearsal(puppet, Choices(patience=1.35))
+    for positions in (pose(T_POSE), pose(UPSIDE_DOWN)):
+        first = show.drives
+        for _ in range(8):  # another match is shown after half a second
+            show.strike(positions)
+    assert show.drives != first
+    assert show.match_session.matching, "the waiting begins anew with another match"
+
+
+def test_who_comes_back_into_view_has_to_stand_anew(puppet: Puppet) -> None:
+    show = Rehearsal(puppet, Choices(patience=0.45))
+    show.strike(pose(T_POSE))
+    for _ in range(10):
+        show.strike(np.full_like(pose(T_POSE), np.nan))
+    show.strike(pose(T_POSE))
+    assert show.match_session.matching
+
+
+def test_too_little_of_the_performer_strikes_no_pose(puppet: Puppet) -> None:
+    show = Rehearsal(puppet, Choices(), source="arms")
+    joints = show.performer.joints
+    hidden = pose(T_POSE)
+    hidden[joints[: len(joints) // 2 + 1]] = np.nan
+    for _ in range(5):
+        assert show.strike(hidden) == ()
+    assert show.match_session.matching
+    hidden = pose(T_POSE)
+    hidden[[joint for joint in range(len(BODY.names)) if joint not in joints]] = np.nan
+    assert show.strike(hidden) != (), "only what drives must be seen"
+    assert not show.match_session.matching
+
+
+def test_a_rank_shows_that_match_and_one_beyond_the_list_is_told(puppet: Puppet) -> None:
+    endless = Choices(patience=math.inf)
+    show = Rehearsal(puppet, endless)
+    ranked = [show.strike(pose(T_POSE))]
+    for _ in range(3):
+        show.match_session.next_match()
+        ranked.append(show.strike(pose(T_POSE)))
+    assert len(set(ranked)) == 4
+    for rank in (1, 2, 4):
+        other = Rehearsal(puppet, Choices(rank=rank, patience=math.inf))
+        assert other.strike(pose(T_POSE)) == ranked[rank - 1]
+    beyond = Rehearsal(puppet, Choices(rank=100_000))
+    with pytest.raises(InputError, match=r"figure has \d+ matches .* no --match 100000$") as told:
+        beyond.strike(pose(T_POSE))
+    assert "\n" not in str(told.value)
+
+
+def test_matches_are_stepped_through_and_stay(puppet: Puppet) -> None:
+    show = Rehearsal(puppet, Choices(patience=math.inf))
+    best = show.strike(pose(T_POSE))
+    show.match_session.next_match()
+    second = show.strike(pose(T_POSE))
+    assert second != best
+    for _ in range(12):
+        assert show.strike(pose(T_POSE)) == second
+    show.match_session.previous_match()
+    assert show.strike(pose(T_POSE)) == best
+    show.match_session.previous_match()
+    assert show.strike(pose(T_POSE)) not in (best, second)
+
+
+def test_matching_again_looks_at_the_pose_alone(puppet: Puppet) -> None:
+    show = Rehearsal(puppet, Choices(patience=math.inf))
+    best = show.strike(pose(T_POSE))
+    show.match_session.next_match()
+    stepped_to = show.strike(pose(T_POSE))
+    show.match_session.accept()
+    assert not show.match_session.matching
+    assert show.moves(pose({**T_POSE, "HipLeft": (0.0, 0.0, 0.6)})) > 0.1
+    show.match_session.match_again()
+    assert show.match_session.matching
+    assert stepped_to != best
+    for _ in range(12):
+        show.strike(pose(T_POSE))
+    assert show.drives == best
+    for _ in range(20):
+        rest = np.abs(show.puppet.deform().vertices - FIGURE.vertices).max()
+    assert rest < 0.02
+
+
+def test_the_next_match_can_be_asked_for_in_the_midst_of_a_performance(puppet: Puppet) -> None:
+    show = Rehearsal(puppet, Choices())
+    best = show.strike(pose(T_POSE))
+    assert not show.match_session.matching
+    show.match_session.next_match()
+    assert show.match_session.matching
+    assert show.strike(pose(T_POSE)) != best
+    assert not show.match_session.matching
+    show.match_session.previous_match()
+    assert show.strike(pose(T_POSE)) == best
+
+
+def test_a_mapping_by_hand_is_taken_as_it_is(puppet: Puppet) -> None:
+    hand = Mapping(ARMS)
+    show = Rehearsal(puppet, Choices(rank=9), hand)
+    show.strike(pose())
+    assert show.puppet.mapping is hand
+    assert not show.match_session.matching
+    show = Rehearsal(puppet, Choices(), hand)
+    show.match_session.rehearse([seen(positions) for positions in waving(3)])
+    assert show.puppet.mapping is hand
+
+
+def test_a_rehearsal_takes_the_pose_most_like_the_puppet(puppet: Puppet) -> None:
+    """The puppet holds its arms level; so does one of the poses, which becomes the rest state."""
+    poses = [seen(pose(turns)) for turns in ({}, {"ElbowLeft": (0, 0, 1.5)}, T_POSE)]
+    show = Rehearsal(puppet, Choices(), Mapping(ARMS))
+    boxes = show.match_session.rehearse(poses)
+    assert not show.match_session.matching
+    assert boxes.shape == (1, 2, 3)
+    assert show.moves(pose(T_POSE)) < 1e-9
+    assert show.moves(pose()) > 0.2
+
+
+@pytest.mark.parametrize("heading", [-2.0, 1.0])
+def test_a_rehearsed_performer_is_seen_facing_the_stage(puppet: Puppet, heading: float) -> None:
+    runs = []
+    for turn in (0.0, heading):
+        show = Rehearsal(puppet, Choices())
+        show.match_session.rehearse([seen(pose(T_POSE, heading=turn))])
+        runs.append((show.drives, show.moves(pose(T_POSE))))
+    assert runs[0][0] == runs[1][0]
+    assert max(moved for _, moved in runs) < 1e-9
+
+
+def test_each_rehearsed_pose_is_matched_by_itself(puppet: Puppet) -> None:
+    """What comes first does not bind: the match is that of the pose that suits best."""
+    alone = Rehearsal(puppet, Choices())
+    alone.match_session.rehearse([seen(pose(T_POSE))])
+    best = alone.drives
+    first = Rehearsal(puppet, Choices())
+    first.match_session.rehearse([seen(pose(UPSIDE_DOWN))])
+    assert first.drives != best
+    both = Rehearsal(puppet, Choices())
+    both.match_session.rehearse([seen(pose(UPSIDE_DOWN)), seen(pose(T_POSE))])
+    assert both.drives == best
+
+
+def test_chains_can_stop_where_the_part_ends_and_turns_can_be_mirrored(puppet: Puppet) -> None:
+    whole = Rehearsal(puppet, Choices(flip=True))
+    whole.strike(pose(T_POSE))
+    assert all(drive.flip for drive in whole.puppet.mapping.drives)
+    stopped = Rehearsal(puppet, Choices(extend=False))
+    stopped.strike(pose(T_POSE))
+    lengths = (
+        [len(drive.target) for drive in whole.drives],
+        [len(drive.target) for drive in stopped.drives],
+    )
+    assert not any(drive.flip for drive in stopped.puppet.mapping.drives)
+    assert sum(lengths[1]) <= sum(lengths[0])

@@ -1,0 +1,103 @@
+"""A limb turns as far as its surface can follow, and no other is held back for it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from runtime.driving.mapping import Drive, Mapping
+from runtime.driving.performer import Performer, Pose, rest_state
+from runtime.driving.turn_limits import MOST_STRETCH, limit_turns
+from runtime.puppet.puppet import Puppet, RootMotion
+from tests.runtime.stick_figures import (
+    ARMS,
+    BODY,
+    FRONT_VIEW,
+    WEB,
+    frame,
+    make_figure,
+    node,
+    pose,
+    waving,
+)
+
+BETWEEN_ARM_AND_HEAD = ((0.16, 1.28, -0.08), (0.64, 1.6, 0.08))
+FIGURE = make_figure()
+HEAD = Drive(
+    tuple(map(BODY.index, ("SpineShoulder", "Neck", "Head"))), tuple(map(node, ("chest", "head")))
+)
+
+
+def seen(positions: np.ndarray) -> Pose:
+    return Performer(BODY).follow(frame(positions))
+
+
+def driven(puppet: Puppet, drives: Sequence[Drive]) -> Puppet:
+    puppet.take(Mapping(tuple(drives)), rest_state(seen(pose())), FRONT_VIEW, RootMotion())
+    return puppet
+
+
+def nods(*angles: float) -> list[Pose]:
+    return [seen(pose({"SpineShoulder": (angle, 0.0, 0.0)})) for angle in angles]
+
+
+def test_only_the_limb_that_cannot_follow_is_held_back() -> None:
+    swings = [
+        seen(pose({"ShoulderLeft": (0, 0, angle), "ShoulderRight": (0, 0, -angle)}))
+        for angle in (0.0, 0.5, 0.9, 1.3)
+    ]
+    free = driven(Puppet(FIGURE), ARMS)
+    box = limit_turns(free, swings)
+    np.testing.assert_array_equal(free.gains, [1.0, 1.0])
+    webbed = driven(Puppet(make_figure(WEB)), ARMS)
+    limit_turns(webbed, swings)
+    assert webbed.gains[0] < 0.95
+    assert webbed.gains[1] == 1.0
+
+    assert box.shape == (2, 3)
+    for moment in swings:
+        free.follow(moment)
+        for _ in range(4):
+            vertices = free.deform().vertices
+        assert (vertices >= box[0] - 0.05).all()
+        assert (vertices <= box[1] + 0.05).all()
+    assert box[0, 0] > -0.9, "an arm that is raised reaches less far to the side"
+    assert box[1, 1] > 1.7, "but higher"
+
+
+@pytest.mark.parametrize(("deepest", "held"), [(0.5, False), (2.2, True)])
+def test_a_small_limb_that_crushes_itself_is_held_back(deepest: float, held: bool) -> None:
+    """In one pose of many, and with so few edges that the whole surface hardly tells."""
+    puppet = driven(Puppet(FIGURE), (HEAD, *ARMS))
+    edges = puppet.pulls()[:, 0]
+    poses = nods(*[0.0] * 9, deepest)
+    unheld = puppet.attempt(poses[-1])[1]
+    assert np.percentile(np.append(np.zeros(9 * len(unheld)), unheld), 99.0) < MOST_STRETCH
+    limit_turns(puppet, poses)
+    assert (puppet.gains[0] < 1.0) == held
+    np.testing.assert_array_equal(puppet.gains[1:], 1.0)
+    assert np.percentile(puppet.attempt(poses[-1])[1][edges], 95.0) <= 1.1 * MOST_STRETCH
+
+
+def test_a_limb_that_another_crushes_is_left_alone() -> None:
+    puppet = driven(Puppet(make_figure(BETWEEN_ARM_AND_HEAD)), (HEAD, *ARMS))
+    limit_turns(
+        puppet, [seen(pose({"ShoulderLeft": (0, 0, angle)})) for angle in [0.0] * 29 + [1.4]]
+    )
+    assert puppet.gains[0] == 1.0
+    assert puppet.gains[1] < 0.95
+
+
+def test_a_rehearsal_leaves_no_trace_in_the_show() -> None:
+    shown = []
+    for rehearsals in (0, 1):
+        puppet, performer = driven(Puppet(FIGURE), ARMS), Performer(BODY)
+        for _ in range(rehearsals):
+            limit_turns(puppet, [seen(positions) for positions in waving(4)])
+        for number, positions in enumerate(waving(4)):
+            puppet.follow(performer.follow(frame(positions, number / 30.0)))
+            motion = puppet.deform()
+        shown.append(motion.vertices)
+    np.testing.assert_array_equal(*shown)

@@ -1,0 +1,59 @@
+"""What was recorded once is never recorded over."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from devices.errors import InputError
+from replay.formats import read_recording
+from runtime.cli import main
+from runtime.show.takes import MOST, set_aside
+
+
+def test_a_second_take_under_the_same_name_leaves_the_first(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    take, kept = tmp_path / "take.mcap", tmp_path / "take-1.mcap"
+    record = ["record", "--device", "sim://show", "--seconds", "0.2", str(take)]
+    assert main(record) == 0
+    first = take.read_bytes()
+    assert main(record) == 0
+    assert kept.read_bytes() == first
+    assert "take-1.mcap" in capfd.readouterr().err
+    replay = ["replay", str(kept), "--character", "paper", "--headless", "--fast"]
+    assert main([*replay, "--record", str(take)]) == 0
+    assert (tmp_path / "take-2.mcap").is_file()
+    for path in (take, kept, tmp_path / "take-2.mcap"):
+        assert len(read_recording(path)) > 5
+
+
+def test_nothing_is_set_aside_that_is_no_take(tmp_path: Path) -> None:
+    told: list[str] = []
+    (tmp_path / "empty.mcap").touch()
+    (tmp_path / "folder.mcap").mkdir()
+    for name in ("absent.mcap", "empty.mcap", "folder.mcap"):
+        set_aside(tmp_path / name, told.append)
+    assert {path.name for path in tmp_path.iterdir()} == {"empty.mcap", "folder.mcap"}
+    assert told == []
+
+
+def test_a_take_takes_no_name_that_is_taken(tmp_path: Path) -> None:
+    told: list[str] = []
+    for name in ("take.mcap", "take-1.mcap"):
+        (tmp_path / name).write_text(name)
+    set_aside(tmp_path / "take.mcap", told.append)
+    assert (tmp_path / "take-1.mcap").read_text() == "take-1.mcap"
+    assert (tmp_path / "take-2.mcap").read_text() == "take.mcap"
+    assert not (tmp_path / "take.mcap").exists()
+    assert len(told) == 1
+
+
+def test_where_all_names_are_taken_the_take_stays(tmp_path: Path) -> None:
+    for number in range(1, MOST + 1):
+        (tmp_path / f"take-{number}.mcap").touch()
+    (tmp_path / "take.mcap").write_text("kept")
+    with pytest.raises(InputError, match="move some away"):
+        set_aside(tmp_path / "take.mcap", [].append)
+    assert (tmp_path / "take.mcap").read_text() == "kept"
