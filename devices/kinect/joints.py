@@ -104,7 +104,7 @@ _AZURE: _Joints = (
 def _skeleton(joints: _Joints) -> Skeleton:
     names = tuple(name for name, *_ in joints)
     parents = [names.index(parent) if parent else -1 for _, parent, *_ in joints]
-    return Skeleton(names, parents, [place for _, _, *place in joints])  # type: ignore[arg-type]
+    return Skeleton(names, parents, [place for _, _, *place in joints])  # type: ignore[arg-type]  # the unpacked rest of a row is three numbers
 
 
 KINECT_V1 = _skeleton(_V1)

@@ -153,7 +153,7 @@ def _add_finger(found: _Found, pointable: Mapping[str, Any]) -> None:
     for name, key, bone in _ENDS[kind]:
         found.places[name] = pointable.get(key)
         if several:
-            found.axes[name] = bones[bone]  # type: ignore[index]
+            found.axes[name] = bones[bone]  # type: ignore[index]  # `several` says that it is a list
 
 
 def _hand(found: _Found) -> Hand:

@@ -51,7 +51,7 @@ class LeapWebSocket:
 
     def __init__(self, host: str, port: int, devices: Callable[[], str] = str) -> None:
         try:
-            import websockets.sync.client  # noqa: F401, PLC0415
+            import websockets.sync.client  # noqa: F401, PLC0415  # an optional extra, checked before the show
         except ImportError:
             raise InputError("leap+ws:// needs the extra: pip install 'bunraku[leap]'") from None
         self.version = NEWEST
@@ -76,8 +76,8 @@ class LeapWebSocket:
         self._closing.set()
 
     def _connect(self, deliver: Deliver) -> None:
-        from websockets.exceptions import ConnectionClosed, WebSocketException  # noqa: PLC0415
-        from websockets.sync.client import connect  # noqa: PLC0415
+        from websockets.exceptions import ConnectionClosed, WebSocketException  # noqa: PLC0415  # an optional extra
+        from websockets.sync.client import connect  # noqa: PLC0415  # an optional extra
 
         url = f"ws://{self._where}/v{self.version}.json"
         verified = False

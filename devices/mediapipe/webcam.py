@@ -27,8 +27,8 @@ class Webcam:
 
     def __init__(self, model: Path, camera: int) -> None:
         try:
-            import cv2  # noqa: PLC0415
-            import mediapipe  # noqa: PLC0415
+            import cv2  # noqa: PLC0415  # an optional extra
+            import mediapipe  # noqa: PLC0415  # an optional extra
         except ImportError:
             raise InputError(
                 "mediapipe://webcam needs the extra: pip install 'bunraku[mediapipe]'"

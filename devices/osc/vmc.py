@@ -224,7 +224,7 @@ class VmcDecoder:
         joint = _bone_called(str(name))
         if joint is None:
             return True  # LastBone, or one of a later version
-        pose = _checked(numbers)  # type: ignore[arg-type]
+        pose = _checked(numbers)  # type: ignore[arg-type]  # `_checked` refuses what is no number
         if pose is None:
             return False
         self._begin(joint, arrival)
@@ -236,7 +236,7 @@ class VmcDecoder:
     def _root(self, message: Message, arrival: float) -> bool:
         if not message.tags.startswith(_POSE):
             return False
-        pose = _checked(message.arguments[1:8])  # type: ignore[arg-type]
+        pose = _checked(message.arguments[1:8])  # type: ignore[arg-type]  # `_checked` refuses what is no number
         if pose is None:
             return False
         if self._rooted and self._assembly.parts:
@@ -249,7 +249,7 @@ class VmcDecoder:
     def _tracker(self, message: Message, arrival: float) -> bool:
         if not message.tags.startswith(_POSE):
             return False
-        pose = _checked(message.arguments[1:8])  # type: ignore[arg-type]
+        pose = _checked(message.arguments[1:8])  # type: ignore[arg-type]  # `_checked` refuses what is no number
         if pose is None:
             return False
         joint = self._on_bone(message.address, str(message.arguments[0]))

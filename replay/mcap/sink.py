@@ -222,7 +222,7 @@ class McapSink:
 def _bytes_of(record: McapRecord) -> bytes:
     builder = RecordBuilder()
     record.write(builder)
-    data: bytes = builder.end()  # type: ignore[no-untyped-call]
+    data: bytes = builder.end()  # type: ignore[no-untyped-call]  # mcap's builder has no types
     return data
 
 

@@ -118,7 +118,7 @@ def _libigl(
 ) -> Callable[[int], object] | None:
     """A call of libigl's solver for a number of iterations; None without libigl."""
     try:
-        import igl  # noqa: PLC0415  an optional peer
+        import igl  # noqa: PLC0415  # an optional extra
     except ImportError:
         return None
     data = igl.ARAPData()

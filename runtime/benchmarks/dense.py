@@ -75,7 +75,7 @@ def _line(row: dict[str, Any]) -> str:
 
 def dense_character(count: int) -> Character:
     """The built-in mannequin with about `count` vertices: subdivided after Loop, then thinned."""
-    import trimesh  # noqa: PLC0415  slow to import
+    import trimesh  # noqa: PLC0415  # slow to import
 
     character = builtin_character("mannequin")
     vertices, faces = character.vertices, character.faces

@@ -40,7 +40,7 @@ def cached_skeleton(
 
 def cache_folder() -> Path:
     """The folder for what can be computed again, by the custom of the platform."""
-    home = Path(os.path.expanduser("~"))  # noqa: PTH111  (Path.home raises where there is none)
+    home = Path(os.path.expanduser("~"))  # noqa: PTH111  # Path.home raises where there is none
     if sys.platform == "win32":
         base = Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
     elif sys.platform == "darwin":

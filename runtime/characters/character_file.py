@@ -109,7 +109,7 @@ def _standing(
 
 
 def _extracted(vertices: NDArray[np.float64], faces: NDArray[np.int64], path: Path) -> Skeleton:
-    from solvers.skeleton.skeletonize import VERSION, extract_skeleton  # noqa: PLC0415  (optional extras)
+    from solvers.skeleton.skeletonize import VERSION, extract_skeleton  # noqa: PLC0415  # an optional extra
 
     try:
         parents, positions = cached_skeleton(vertices, faces, extract_skeleton, VERSION)

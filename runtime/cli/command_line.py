@@ -24,7 +24,7 @@ BAD_INPUT = 2
 class _Parser(argparse.ArgumentParser):
     """Answers bad arguments with the one line that every command answers bad input with."""
 
-    def error(self, message: str) -> None:  # type: ignore[override]
+    def error(self, message: str) -> None:  # type: ignore[override]  # raises where argparse exits
         raise InputError(f"{message} (see `{self.prog} --help`)")
 
 

@@ -148,7 +148,7 @@ def _watch(address: str, seconds: float, stop: threading.Event) -> Watch:
             _look(seen, stream)
             if time.perf_counter() >= until:
                 break
-        seen.traffic = stream.traffic  # type: ignore[attr-defined]
+        seen.traffic = stream.traffic  # type: ignore[attr-defined]  # a live stream has it
     return _told(seen, time.perf_counter(), seconds)
 
 

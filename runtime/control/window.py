@@ -192,7 +192,7 @@ class Window:
 def _open_window(title: str, size: tuple[int, int], hints: Mapping[int, bool]) -> Any:
     """Ask glfw for a window and make its context current."""
     problems: list[str] = []
-    report: Any = lambda _code, text: problems.append(text.decode("utf-8", "replace"))  # noqa: E731
+    report: Any = lambda _code, text: problems.append(text.decode("utf-8", "replace"))  # noqa: E731  # a lambda fits GLFW's untyped callback
     glfw.set_error_callback(report)
     leave_headless()
     handle = None

@@ -62,7 +62,7 @@ def interruptible() -> Iterator[None]:
             signal.signal(number, before[number])
 
 
-class held:  # noqa: N801, reads as the function that it stands for
+class held:  # noqa: N801  # reads as the function that it stands for
     """A block within `interruptible` that is finished before anybody is listened to.
 
     It changes no signal handler: a show does this every frame, and six changes take 0.1 ms.

@@ -194,7 +194,7 @@ def _reduced(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntAr
     if len(points) <= _GRAPH_VERTICES:
         return points, triangles
     try:
-        import fast_simplification  # noqa: PLC0415  (an optional extra)
+        import fast_simplification  # noqa: PLC0415  # an optional extra
     except ImportError as error:
         raise ImportError("curve skeletons need: pip install 'bunraku[characters]'") from error
     fewer_points, fewer = fast_simplification.simplify(
@@ -267,7 +267,7 @@ def _local_separators(surface: _Graph) -> tuple[FloatArray, IntArray]:
     """Nodes and edges that PyGEL3D finds, from every vertex: its sampling draws from the system's
     random device and gives another skeleton at each call."""
     try:
-        from pygel3d import graph  # noqa: PLC0415  (an optional extra)
+        from pygel3d import graph  # noqa: PLC0415  # an optional extra
     except ImportError as error:
         raise ImportError("curve skeletons need: pip install 'bunraku[characters]'") from error
     network = graph.Graph()

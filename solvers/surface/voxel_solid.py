@@ -50,7 +50,7 @@ class VoxelSolid:
             ImportError: PyGEL3D is not installed.
         """
         try:
-            from pygel3d import hmesh  # noqa: PLC0415  (an optional extra)
+            from pygel3d import hmesh  # noqa: PLC0415  # an optional extra
         except ImportError as error:
             raise ImportError("curve skeletons need: pip install 'bunraku[characters]'") from error
         field = gaussian_filter(self.voxels.astype(np.float32), _BLUR)

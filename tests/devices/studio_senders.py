@@ -6,7 +6,7 @@ import json
 import struct
 from collections.abc import Mapping, Sequence
 
-import lz4.frame  # type: ignore[import-untyped]
+import lz4.frame
 import numpy as np
 from pythonosc.osc_message import OscMessage
 from scipy.spatial.transform import Rotation

@@ -366,7 +366,7 @@ def test_degenerate_meshes_stay_finite_and_follow(energy: str):
 )
 def test_the_smallest_meshes_work(points: object, triangles: object, handles: object):
     vertices = np.asarray(points, dtype=float)
-    solver = ArapSolver(vertices, triangles, handles)  # type: ignore[arg-type]
+    solver = ArapSolver(vertices, triangles, handles)
     shift = np.array([1.0, 2.0, 3.0])
     answer = solver.solve(vertices[handles] + shift, 3)
     np.testing.assert_allclose(answer, vertices + shift, rtol=1e-9, atol=1e-9)
@@ -440,7 +440,7 @@ def test_bad_targets_are_named_and_change_nothing(targets: object, message: str)
     solver = ArapSolver(GOOD, [[0, 1, 2]], [1])
     before = solver.solve([[1.0, 1.0, 0.0]])
     with pytest.raises(ValueError, match=message):
-        solver.solve(targets)  # type: ignore[arg-type]
+        solver.solve(targets)
     np.testing.assert_allclose(solver.solve([[1.0, 1.0, 0.0]]), before, atol=1e-12)
     with pytest.raises(ValueError, match="iterations"):
         solver.solve([[1.0, 1.0, 0.0]], -1)

@@ -121,7 +121,7 @@ class Press:
             self.faces,
             self.handles,
             groups=self.groups,
-            **options,  # type: ignore[arg-type]
+            **options,
         )
 
     def pressed(self, solver: ArapSolver, ratio: float, frames: int = 20) -> np.ndarray:
@@ -548,7 +548,7 @@ def test_degenerate_meshes_stay_finite_and_follow(energy: str, scale: float):
 )
 def test_the_smallest_meshes_work(points: object, triangles: object, handles: object):
     vertices = np.asarray(points, dtype=float)
-    solver = SquashStretchSolver(vertices, triangles, handles)  # type: ignore[arg-type]
+    solver = SquashStretchSolver(vertices, triangles, handles)
     shift = np.array([1.0, 2.0, 3.0])
     answer = solver.solve(vertices[handles] + shift, 3)
     np.testing.assert_allclose(answer, vertices + shift, rtol=1e-9, atol=1e-9)

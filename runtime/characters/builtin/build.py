@@ -49,7 +49,7 @@ def main() -> None:
     folder = Path(__file__).parent / "meshes"
     folder.mkdir(exist_ok=True)
     for name in parser.parse_args().names or SCULPTORS:
-        np.savez_compressed(folder / f"{name}.npz", **built(SCULPTORS[name]()))  # type: ignore[arg-type]
+        np.savez_compressed(folder / f"{name}.npz", **built(SCULPTORS[name]()))  # type: ignore[arg-type]  # numpy declares its keywords as flags as well
 
 
 if __name__ == "__main__":

@@ -22,7 +22,7 @@ _FAIR_ANGLE = np.radians(16.0)
 
 def level_set(sculpture: Sculpture) -> tuple[Array, Faces]:
     """The surface of the solid, as vertices (n, 3) [m] and faces (m, 3)."""
-    from manifold3d import Manifold  # noqa: PLC0415
+    from manifold3d import Manifold  # noqa: PLC0415  # an optional extra
 
     bounds = [*sculpture.lower, *sculpture.upper]
     asked: list[tuple[float, float, float]] = []
@@ -165,7 +165,7 @@ def split(vertices: Array, faces: Faces, chosen: Mask) -> tuple[Array, Faces]:
 
 
 def _flipped(vertices: Array, faces: Faces) -> tuple[Array, Faces]:
-    from pygel3d import hmesh  # noqa: PLC0415
+    from pygel3d import hmesh  # noqa: PLC0415  # an optional extra
 
     mesh = hmesh.Manifold.from_triangles(vertices, faces)
     hmesh.optimize_valency(mesh)

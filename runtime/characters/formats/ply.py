@@ -20,7 +20,7 @@ def read_ply(content: bytes) -> FileMesh:
     Raises:
         MeshError: what is wrong with it.
     """
-    import trimesh  # noqa: PLC0415  (half a second, and only some characters need it)
+    import trimesh  # noqa: PLC0415  # half a second, and only some characters need it
 
     count, face_count = _declared(content)
     check_counts(count, face_count)

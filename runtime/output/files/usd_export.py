@@ -163,8 +163,8 @@ def _first_reason(message: str) -> str:
 
 def _import_pxr(path: Path) -> Any:
     try:
-        import pxr  # noqa: PLC0415
-        from pxr import Sdf, Tf, Usd, UsdGeom, Vt  # noqa: F401, PLC0415
+        import pxr  # noqa: PLC0415  # an optional extra
+        from pxr import Sdf, Tf, Usd, UsdGeom, Vt  # noqa: F401, PLC0415  # an optional extra, checked before the show
     except ImportError as error:
         raise InputError(
             f"cannot write {path}: USD needs the extra: pip install 'bunraku[usd]'"

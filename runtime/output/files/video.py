@@ -182,7 +182,7 @@ def encoder_for(path: Path) -> str:
 
 def _import_av(path: Path) -> Any:
     try:
-        import av  # noqa: PLC0415
+        import av  # noqa: PLC0415  # an optional extra
     except ImportError as error:
         raise InputError(
             f"cannot write {path}: video needs the extra: pip install 'bunraku[video]'"

@@ -59,8 +59,8 @@ def import_cyndilib() -> Any:
         InputError: it is missing, or NDI is not for this machine.
     """
     try:
-        import cyndilib  # noqa: PLC0415
-        import cyndilib.wrapper  # noqa: PLC0415
+        import cyndilib  # noqa: PLC0415  # an optional extra
+        import cyndilib.wrapper  # noqa: PLC0415  # an optional extra
     except (ImportError, OSError) as error:
         raise InputError("--ndi needs the extra: pip install 'bunraku[ndi]'") from error
     return cyndilib

@@ -90,11 +90,11 @@ def import_shared_texture(platform: str = sys.platform) -> Any:
         )
     try:
         if platform == "darwin":
-            import syphon  # noqa: PLC0415
-            import syphon.utils.raw  # noqa: PLC0415
+            import syphon  # noqa: PLC0415  # an optional extra
+            import syphon.utils.raw  # noqa: PLC0415  # an optional extra
 
             return syphon
-        import SpoutGL  # noqa: PLC0415
+        import SpoutGL  # noqa: PLC0415  # an optional extra
     except (ImportError, OSError) as error:
         raise InputError("--spout needs the extra: pip install 'bunraku[spout]'") from error
     return SpoutGL

@@ -61,7 +61,7 @@ def import_pyvirtualcam() -> Any:
         InputError: it is missing.
     """
     try:
-        import pyvirtualcam  # noqa: PLC0415
+        import pyvirtualcam  # noqa: PLC0415  # an optional extra
     except (ImportError, OSError) as error:
         raise InputError(
             "--virtual-camera needs the extra: pip install 'bunraku[camera]'"

@@ -252,7 +252,7 @@ def test_datagrams_on_loopback_are_frames() -> None:
         open_stream("mediapipe://127.0.0.1:0") as stream,
         socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender,
     ):
-        where = ("127.0.0.1", stream.transport.port)  # type: ignore[attr-defined]
+        where = ("127.0.0.1", stream.transport.port)
         frames: list[SkeletonFrame] = []
         end, pause, sent = time.monotonic() + PATIENCE, threading.Event(), 0
         while len(frames) < 10 and time.monotonic() < end:
@@ -347,7 +347,7 @@ def test_the_documented_sender_sends_what_is_understood(monkeypatch: pytest.Monk
     monkeypatch.setitem(sys.modules, "mediapipe", _Anything())
     with open_stream("mediapipe://127.0.0.1:0") as stream:
         assert script.count("7005") == 1
-        port = stream.transport.port  # type: ignore[attr-defined]
+        port = stream.transport.port
         names: dict[str, Any] = {}
         exec(script.replace("7005", str(port)), names)
         names["sender"].close()
@@ -357,4 +357,4 @@ def test_the_documented_sender_sends_what_is_understood(monkeypatch: pytest.Monk
             pause.wait(0.002)
             frames += stream.poll()
         assert len(frames) == 3
-        assert stream.traffic.refused == 0  # type: ignore[attr-defined]
+        assert stream.traffic.refused == 0

@@ -461,7 +461,7 @@ def test_the_presets_work() -> None:
 def test_through_a_socket_from_python_osc_s_own_client() -> None:
     with open_stream("nimate://127.0.0.1:0") as stream:
         assert isinstance(stream, LiveStream)
-        port: int = stream.transport.port  # type: ignore[attr-defined]
+        port: int = stream.transport.port
         with SimpleUDPClient("127.0.0.1", port) as client:
             for one in nimate(body() + FAR, what="place"):
                 client.send_message(one.address, one.params)

@@ -7,7 +7,7 @@ import json
 import socket
 from typing import Any
 
-import lz4.frame  # type: ignore[import-untyped]
+import lz4.frame
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -253,7 +253,7 @@ def test_through_a_socket() -> None:
     with open_stream("rokoko://127.0.0.1:0") as stream:
         assert isinstance(stream, LiveStream)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-            sender.sendto(packed(scene()), ("127.0.0.1", stream.transport.port))  # type: ignore[attr-defined]
+            sender.sendto(packed(scene()), ("127.0.0.1", stream.transport.port))
         assert stream.wait(30.0)
         (frame,) = stream.poll()
     assert frame.positions == pytest.approx(posed(ROKOKO), abs=1e-9)

@@ -257,7 +257,7 @@ def test_through_a_socket() -> None:
         assert stream.skeleton is GLOVES
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
             for data in mxtp02(posed(GLOVES), parts=2):
-                sender.sendto(data, ("127.0.0.1", stream.transport.port))  # type: ignore[attr-defined]
+                sender.sendto(data, ("127.0.0.1", stream.transport.port))
         assert stream.wait(30.0)
         (frame,) = stream.poll()
     assert frame.positions == pytest.approx(posed(GLOVES), abs=1e-5)

@@ -381,7 +381,7 @@ def test_closing_ends_its_connections_and_gives_the_port_back() -> None:
         silent, busy = connect(stream), connect(stream)
         busy.sendall(pose(0) + pose(1)[:50])
         received(stream, 1)
-        port = stream.transport.port  # type: ignore[attr-defined]
+        port = stream.transport.port
     assert not stream._thread.is_alive()
     with silent, busy:
         assert closed_by_us(silent)
@@ -434,7 +434,7 @@ def test_what_cannot_be_bound_is_one_line(host: str, why: str) -> None:
 def test_it_listens_on_this_machine_only_and_by_udp_where_not_told_otherwise() -> None:
     with open_stream("xsens://:0?transport=tcp") as stream:
         assert isinstance(stream, LiveStream)
-        assert stream.transport.host == "127.0.0.1"  # type: ignore[attr-defined]
+        assert stream.transport.host == "127.0.0.1"
     with open_stream("xsens://:0") as stream:
         assert isinstance(stream, LiveStream)
         assert not isinstance(stream.transport, TcpTransport)

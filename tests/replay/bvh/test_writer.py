@@ -48,7 +48,7 @@ def recording(
 
 def written(made_of: Recording, **options: object) -> tuple[str, BvhMade]:
     file = io.StringIO()
-    made = write_bvh_recording(file, made_of, **options)  # type: ignore[arg-type]
+    made = write_bvh_recording(file, made_of, **options)
     return file.getvalue(), made
 
 
@@ -58,7 +58,7 @@ def understood(text: str) -> tuple[dict[str, Array], float]:
     Written from the format's description: words, a stack of matrices, SciPy's Euler angles.
     """
     head, body = text.split("MOTION")
-    frames, step = re.search(r"Frames: (\d+)\nFrame Time: ([\d.]+)\n", body).groups()  # type: ignore[union-attr]
+    frames, step = re.search(r"Frames: (\d+)\nFrame Time: ([\d.]+)\n", body).groups()
     rows = np.array([line.split() for line in body.splitlines()[3:]], np.float64)
     assert len(rows) == int(frames)
     places: dict[str, Array] = {}

@@ -287,7 +287,7 @@ def test_every_shared_recording_stands_upright_facing_the_front(shared: Path) ->
         pose = recording.positions[len(recording) // 2 if path.name == "joints.csv" else 0]
 
         def at(kind: Kind, side: Side = Side.CENTRE, pose: np.ndarray = pose) -> np.ndarray:
-            joint = first_of(parts, skeleton, kind, side)  # noqa: B023
+            joint = first_of(parts, skeleton, kind, side)  # noqa: B023  # called within the same turn of the loop
             assert joint is not None
             return pose[joint]
 

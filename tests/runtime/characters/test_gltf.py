@@ -622,7 +622,7 @@ def test_any_document_reads_or_is_refused(tmp_path: Path, data: st.DataObject) -
     try:
         model = read_gltf(path)
     except InputError as error:
-        assert "\n" not in str(error)  # noqa: PT017
+        assert "\n" not in str(error)  # noqa: PT017  # either outcome is fine, one is checked
         return
     assert np.isfinite(model.file_vertices).all()
     assert model.faces.max() < len(model.file_vertices)

@@ -493,7 +493,7 @@ def test_an_interrupted_record_is_whole(tmp_path: Path) -> None:
     assert told == f"bunraku: {len(read_recording(out))} frames in {out}\n"
 
 
-class _performing:  # noqa: N801  (reads as the `with` that it is)
+class _performing:  # noqa: N801  # reads as the `with` that it is
     """A process that is known to perform: its file `grows` beyond `at_least` bytes."""
 
     def __init__(self, arguments: list[Any], folder: Path, grows: Path, at_least: int = 32) -> None:
@@ -536,7 +536,7 @@ def test_a_held_block_is_finished_first() -> None:
     with pytest.raises(KeyboardInterrupt) as raised:
         work()
     assert done == ["inner", "outer"]
-    assert raised.value.code == 143  # type: ignore[attr-defined]
+    assert raised.value.code == 143
 
 
 @posix_only

@@ -83,7 +83,7 @@ def test_bvh_to_mcap_and_back_is_the_same_motion(
     assert first.skeleton.names == last.skeleton.names
     assert len(first) == len(last) == FRAMES
     assert np.abs(first.positions - last.positions).max() < 1e-5
-    turned = np.abs(np.sum(first.rotations * last.rotations, axis=2))  # type: ignore[operator]
+    turned = np.abs(np.sum(first.rotations * last.rotations, axis=2))
     assert turned.min() > 1 - 1e-9
 
 

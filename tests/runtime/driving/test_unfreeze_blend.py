@@ -131,7 +131,7 @@ def test_a_second_hold_on_the_way_departs_from_there() -> None:
 def test_a_rest_state_that_is_taken_meanwhile_is_there_at_once() -> None:
     easing, target = UnfreezeBlend(BODY), followed(pose(T_POSE))
     let_go(followed(pose(UP)), target, [2.05], easing)
-    assert easing.follow(target, 2.1, [object()]).seen is target.seen  # type: ignore[list-item]
+    assert easing.follow(target, 2.1, [object()]).seen is target.seen
 
 
 def test_who_is_lost_on_the_way_goes_on_from_there() -> None:

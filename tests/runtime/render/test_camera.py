@@ -42,7 +42,7 @@ def test_a_margin_moves_the_camera_away_by_its_share() -> None:
     aspect=st.floats(0.4, 3.0),
     margin=st.floats(0.0, 0.3),
 )
-def test_boxes_touch_the_margin_and_never_cross_it(  # noqa: PLR0917
+def test_boxes_touch_the_margin_and_never_cross_it(  # noqa: PLR0917  # hypothesis passes them by name
     low: tuple[float, float, float],
     size: tuple[float, float, float],
     yaw: float,

@@ -94,7 +94,7 @@ def ball(colour: tuple[float, ...] = RED, height: float = 1.4) -> Character:
 def sheet(**more: object) -> Character:
     corners = np.array([[-0.5, 0.3, 0], [0.5, 0.3, 0], [0.5, 1.3, 0], [-0.5, 1.3, 0]])
     uvs = np.array([[0, 1], [1, 1], [1, 0], [0, 0]])
-    return character_of(corners, np.array([[0, 1, 2], [0, 2, 3]]), uvs=uvs, **more)  # type: ignore[arg-type]
+    return character_of(corners, np.array([[0, 1, 2], [0, 2, 3]]), uvs=uvs, **more)
 
 
 def performer() -> SkeletonInset:

@@ -212,7 +212,7 @@ def test_stiffness_may_be_turned_up_while_bent() -> None:
 def test_bad_regions_are_named(region_of: object, rigidity: object, message: str) -> None:
     solver = ArapSolver(np.eye(3), [[0, 1, 2]], [0])
     with pytest.raises(ValueError, match=message):
-        solver.stiffen(region_of, rigidity)  # type: ignore[arg-type]
+        solver.stiffen(region_of, rigidity)
 
 
 @pytest.mark.parametrize("stiffness", [-0.1, 1.0, np.nan])

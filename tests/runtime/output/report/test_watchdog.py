@@ -6,7 +6,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from runtime.output.report.report import Report, watchdog
+from runtime.output.report import watchdog
+from runtime.output.report.report import Report
 from runtime.output.report.watchdog import Finding, Watchdog
 from solvers.signal.streaming_median import EnergyHistogram
 from solvers.surface.edges import Edges
