@@ -188,9 +188,9 @@ def _warm() -> None:
     VmcDecoder()  # compiles what reads its packets
     BridgeReceiver(LATEST)
     proxy_of(puppets[0].character, dense=0, count=1_000)  # as for a dense character
-    puppets[0].skin.elasticity = Elasticity(cartoon=1.0, volume_gain=1.5, stiffness=0.5)
+    puppets[0].surface.elasticity = Elasticity(cartoon=1.0, volume_gain=1.5, stiffness=0.5)
     anchors = len(puppets[1].binding.node)
-    puppets[1].skin.weigh(np.ones(anchors))  # as of a limb that lets go
+    puppets[1].surface.weigh(np.ones(anchors))  # as of a limb that lets go
     context = headless_context()
     scene = Scene(context, (320, 180), puppets, recording.skeleton)
     report = Report(None)

@@ -131,12 +131,12 @@ def _made(character: Character, number: int, options: argparse.Namespace) -> Pup
         return values[min(number, len(values) - 1)] if values else otherwise
 
     puppet = Puppet(character, iterations=options.iterations, energy=asked(options.energy, SPOKES))
-    puppet.skin.elasticity = Elasticity(
+    puppet.surface.elasticity = Elasticity(
         cartoon=asked(options.cartoon, 0.0),
         volume_gain=asked(options.volume_gain, 1.0),
         stiffness=asked(options.stiffness, 0.0),
     )
-    for note in puppet.skin.notes:
+    for note in puppet.surface.notes:
         warn(f"{character.name}: {note}")
     return puppet
 
@@ -238,7 +238,7 @@ class _Show:
             stream=self._source.stream,
             conditioning=self._conditioning,
             loop=loop,
-            skins=[puppet.skin for puppet in self._puppets],
+            surfaces=[puppet.surface for puppet in self._puppets],
             takes=self._open_takes(),
             scene=self._scene,
         )

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 from devices.stream import SkeletonStream
 from replay.player import Player
 from runtime.conditioning.switches import SWITCHES, Conditioning
-from runtime.puppet.deformable_surface import Elasticity, Skin
+from runtime.puppet.deformable_surface import DeformableSurface, Elasticity
 from runtime.show.act_group import Cues
 from runtime.show.loop import FrameLoop
 from runtime.show.scene import Scene
@@ -35,7 +35,7 @@ class ShowControls:
         stream: where frames come from; a `Player` can be held and wound back.
         conditioning: what is done to them.
         loop: performs them.
-        skins: the characters' surfaces.
+        surfaces: the characters' surfaces.
         takes: records.
         theatre: where the show is seen, or None where nobody sees it.
         leaving: whether it is time to go.
@@ -45,7 +45,7 @@ class ShowControls:
     stream: SkeletonStream
     conditioning: Conditioning
     loop: FrameLoop
-    skins: Sequence[Skin]
+    surfaces: Sequence[DeformableSurface]
     takes: Takes
     scene: Scene | None = None
     leaving: bool = False
@@ -107,14 +107,14 @@ def _nudge(text: str, field: str, by: float) -> Action:
 
 
 def _made_of(desk: ShowControls, field: str) -> float:
-    return min(float(getattr(desk.skins[0].elasticity, field)) / MOST[field], 1.0)
+    return min(float(getattr(desk.surfaces[0].elasticity, field)) / MOST[field], 1.0)
 
 
 def _make(desk: ShowControls, field: str, value: float) -> None:
-    for skin in desk.skins:
-        changed: Elasticity = replace(skin.elasticity, **{field: value * MOST[field]})
-        if changed != skin.elasticity:
-            skin.elasticity = changed
+    for surface in desk.surfaces:
+        changed: Elasticity = replace(surface.elasticity, **{field: value * MOST[field]})
+        if changed != surface.elasticity:
+            surface.elasticity = changed
 
 
 def _conditioning(name: str, text: str) -> Action:

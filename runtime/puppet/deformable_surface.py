@@ -39,7 +39,7 @@ class Elasticity:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Anchors:
-    """Where the bones take the A anchors of a skin.
+    """Where the bones take the A anchors of a surface.
 
     Attributes:
         turns: (A, 4) how far each has turned from rest, quaternions (x, y, z, w).
@@ -54,7 +54,7 @@ class Anchors:
     whole: Array
 
 
-class Skin:
+class DeformableSurface:
     """Binds a character's surface to its bones once, and lets it follow them.
 
     A dense surface is not deformed itself: a coarse proxy of it is, and it follows.

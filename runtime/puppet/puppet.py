@@ -13,7 +13,7 @@ from runtime.driving.exaggeration import Exaggeration, Strain
 from runtime.driving.limb_release import LimbRelease
 from runtime.driving.mapping import Drive, Mapping
 from runtime.driving.performer import Pose, Rest
-from runtime.puppet.deformable_surface import Anchors, Skin
+from runtime.puppet.deformable_surface import Anchors, DeformableSurface
 from solvers.deform.arap_cells import SPOKES
 from solvers.deform.handles import HARD
 from solvers.retarget.abstraction import abstract
@@ -75,8 +75,8 @@ class Puppet:
         tree: the character's nodes, hung on `root`.
         root: the node that stays in place.
         mapping: what drives it, or would.
-        skin: its surface, on its bones.
-        binding: how the skin hangs on the nodes.
+        surface: its surface, on its bones.
+        binding: how the surface hangs on the nodes.
         gains: for each drive the share of the performer's turns that is carried over, in (0, 1].
     """
 
@@ -87,8 +87,8 @@ class Puppet:
         tree = Tree(skeleton.parents, skeleton.rest_positions)
         self.root = abstract(tree).root
         self.tree = tree.rerooted(self.root)
-        self.skin = Skin(character, self.tree, energy=energy)
-        self.binding = self.skin.binding
+        self.surface = DeformableSurface(character, self.tree, energy=energy)
+        self.binding = self.surface.binding
         self._standing = [np.empty_like(character.vertices) for _ in range(2)]
         self.mapping = Mapping(())
         self.gains = np.ones(0)
@@ -164,7 +164,7 @@ class Puppet:
         self._limb_release = LimbRelease(len(chains))
         self._seen = np.ones(len(chains), dtype=np.bool_)
         self._limb_of_anchor = self._chain_above()[np.where(self._bone >= 0, self._bone, node)]
-        self.skin.weigh(np.full(len(node), HARD))
+        self.surface.weigh(np.full(len(node), HARD))
 
     def _chain_above(self) -> Indices:
         """For each node the chain that moves it, or that it rides on; -1 for none."""
@@ -179,19 +179,19 @@ class Puppet:
 
         Returns:
             (2, 3) [m] least and greatest corner of what it fills on the stage, and (E,) the
-            relative change of length of the edges of `skin`.
+            relative change of length of the edges of `surface`.
         """
         self.forget()
         self.follow(pose)
         still = Strain(np.ones(len(self._chains)), 1.0)
-        deformed = self.skin.deform(self._anchors(still), FROM_REST)
+        deformed = self.surface.deform(self._anchors(still), FROM_REST)
         seen = self._with_body(deformed).vertices
         box = np.array([seen.min(axis=0), seen.max(axis=0)])
-        return box, self.skin.edges.stretch(deformed)
+        return box, self.surface.edges.stretch(deformed)
 
     def forget(self) -> None:
         """Go on as if no pose had been struck."""
-        self.skin.reset()
+        self.surface.reset()
         self._retargets.reset()
 
     def pulls(self) -> NDArray[np.bool_]:
@@ -204,7 +204,7 @@ class Puppet:
             if self._parents[node] >= 0:
                 moved[node] |= moved[self._parents[node]]
         bone = np.where(self._bone >= 0, self._bone, self.binding.node)
-        near, far = bone[self.binding.owner][self.skin.edges.ends].T
+        near, far = bone[self.binding.owner][self.surface.edges.ends].T
         pulls: NDArray[np.bool_] = bent[near] | bent[far] | (moved[near] != moved[far])
         return pulls
 
@@ -252,17 +252,17 @@ class Puppet:
     def deform(self) -> Motion:
         """Let the surface follow the nodes, and the whole follow the performer's body."""
         if self._limb_release.follow(self._time, self._seen):
-            self.skin.weigh(np.append(self._limb_release.weights, HARD)[self._limb_of_anchor])
+            self.surface.weigh(np.append(self._limb_release.weights, HARD)[self._limb_of_anchor])
         strain = self._strain()
         self._positions = self._stretched(strain)
-        return self._with_body(self.skin.deform(self._anchors(strain), self._before_shown))
+        return self._with_body(self.surface.deform(self._anchors(strain), self._before_shown))
 
     def settle(self) -> None:
         """Take the iterations that are left of this frame, now that the surface has been shown.
 
         A frame is seen an iteration earlier, and the next starts as near as if it had waited.
         """
-        self.skin.settle(self.iterations - self._before_shown)
+        self.surface.settle(self.iterations - self._before_shown)
 
     @property
     def _before_shown(self) -> int:
@@ -270,7 +270,7 @@ class Puppet:
 
     def _strain(self) -> Strain:
         """How far the character's own motion stretches it."""
-        amount = self.skin.elasticity.cartoon
+        amount = self.surface.elasticity.cartoon
         posed = self._placed.positions
         tips = posed[self._tips] - posed[self._starts]
         return self._exaggeration.strain(self._time, tips, self._lift, amount)
@@ -284,7 +284,7 @@ class Puppet:
         return self._skeleton_pose.stretched(posed, shares) @ self._whole(strain).T
 
     def _whole(self, strain: Strain) -> Array:
-        thin = strain.body ** (-0.5 * self.skin.elasticity.volume_gain)
+        thin = strain.body ** (-0.5 * self.surface.elasticity.volume_gain)
         return np.diag([thin, strain.body, thin])
 
     def _anchors(self, strain: Strain) -> Anchors:
@@ -294,7 +294,7 @@ class Puppet:
         return Anchors(turns, pivots, strain.of_limbs(self._limb_of_bone), self._whole(strain))
 
     def _with_body(self, deformed: Array) -> Motion:
-        vertices = self.skin.cover(deformed)
+        vertices = self.surface.cover(deformed)
         self._standing.reverse()
         standing = self._standing[0]
         about = self.tree.positions[self.root]

@@ -69,8 +69,8 @@ class Show:
     ) -> None:
         puppet.rest()
         puppet.show(Mapping(()))
-        puppet.skin.elasticity = Elasticity()
-        puppet.skin.reset()
+        puppet.surface.elasticity = Elasticity()
+        puppet.surface.reset()
         self.now = 0.0
         self.told: list[str] = []
         self.seen = Seen()
@@ -104,7 +104,7 @@ class Show:
             stream=stream,
             conditioning=self.switches,
             loop=self.loop,
-            skins=[puppet.skin],
+            surfaces=[puppet.surface],
             takes=self.takes,
             scene=self.scene,
         )

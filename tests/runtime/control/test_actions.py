@@ -291,7 +291,7 @@ def test_faders_set_what_every_character_is_made_of(show: Show, name: str) -> No
     field = FADERS[name]
     for value in (0.0, 0.25, 1.0):
         put(show, name, value)
-        made = show.puppet.skin.elasticity
+        made = show.puppet.surface.elasticity
         assert getattr(made, field) == pytest.approx(value * MOST[field])
         assert light(show, name) == pytest.approx(value)
         others = {each: getattr(made, each) for each in FADERS.values() if each != field}
@@ -306,11 +306,11 @@ def test_faders_set_what_every_character_is_made_of(show: Show, name: str) -> No
 
 
 def test_a_character_made_beyond_the_faders_end_is_left_so(show: Show) -> None:
-    show.puppet.skin.elasticity = Elasticity(volume_gain=5.0)
+    show.puppet.surface.elasticity = Elasticity(volume_gain=5.0)
     press(show, "volume-up")
-    assert show.puppet.skin.elasticity.volume_gain == 5.0
+    assert show.puppet.surface.elasticity.volume_gain == 5.0
     press(show, "volume-down")
-    assert show.puppet.skin.elasticity.volume_gain == pytest.approx(0.9 * MOST["volume_gain"])
+    assert show.puppet.surface.elasticity.volume_gain == pytest.approx(0.9 * MOST["volume_gain"])
 
 
 def test_more_cartoon_changes_what_is_performed(show: Show) -> None:

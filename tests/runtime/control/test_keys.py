@@ -101,7 +101,7 @@ def test_a_key_that_is_held_down_turns_no_switch_over_again_but_steps_on(show: S
         show.window.events.extend([KeyPressed(key), *again])
     show.controls.serve()
     assert show.scene.blackout.target == 1.0
-    assert show.puppet.skin.elasticity.cartoon == pytest.approx(0.4)
+    assert show.puppet.surface.elasticity.cartoon == pytest.approx(0.4)
 
 
 def test_f_frames_everybody(show: Seat) -> None:

@@ -131,26 +131,26 @@ def test_the_whole_table_is_at_hand_by_its_names(show: Staged) -> None:
 
 
 def test_a_fader_goes_where_it_is_put_and_stays_within_its_way(show: Staged) -> None:
-    skin = show.puppet.skin
+    surface = show.puppet.surface
     for value, cartoon in ((0.25, 0.25), (7.0, 1.0), (-3.0, 0.0), (1, 1.0), (float("inf"), 1.0)):
         show.client.send_message("/bunraku/cartoon", value)
-        show.until(lambda cartoon=cartoon: skin.elasticity.cartoon == cartoon)
+        show.until(lambda cartoon=cartoon: surface.elasticity.cartoon == cartoon)
     for step in range(200):  # a thumb on the fader: only where it ends counts
         show.client.send_message("/bunraku/cartoon", step / 400.0)
-    show.until(lambda: skin.elasticity.cartoon == pytest.approx(199 / 400.0))
+    show.until(lambda: surface.elasticity.cartoon == pytest.approx(199 / 400.0))
     show.client.send_message("/bunraku/cartoon", float("nan"))
     show.client.send_message("/bunraku/cartoon", [])
     show.client.send_message("/bunraku/cartoon", "much")
     show.client.send_message("/bunraku/cartoon", [0.5, 0.5])
     show.until(lambda: show.remote.refused == 4)
-    assert skin.elasticity.cartoon == pytest.approx(199 / 400.0)
+    assert surface.elasticity.cartoon == pytest.approx(199 / 400.0)
 
 
 def test_a_switch_can_be_set_whatever_it_was(show: Staged) -> None:
     for value in (1, 1, 0, 0, 1):
         show.client.send_message("/bunraku/predict/set", value)
         show.client.send_message("/bunraku/cartoon/set", value)
-        show.until(lambda value=value: show.puppet.skin.elasticity.cartoon == value)
+        show.until(lambda value=value: show.puppet.surface.elasticity.cartoon == value)
         assert show.switches.predict is bool(value)
 
 
@@ -193,7 +193,7 @@ def test_lights_follow_on_the_phones_own_port(
         readable = {f"/bunraku/state/{name}" for name, a in ACTIONS.items() if a.read}
         show.until(lambda: set(lights) == readable)
         show.switches.mirror = False  # by a key, say
-        show.puppet.skin.elasticity = type(show.puppet.skin.elasticity)(cartoon=0.5)
+        show.puppet.surface.elasticity = type(show.puppet.surface.elasticity)(cartoon=0.5)
         show.until(lambda: lights["/bunraku/state/mirror"] == 0.0)
         show.until(lambda: lights["/bunraku/state/cartoon"] == 0.5)
         lights.clear()  # datagrams get lost

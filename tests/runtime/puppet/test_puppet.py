@@ -48,7 +48,7 @@ def seen(positions: np.ndarray) -> Pose:
 def driven(puppet: Puppet, drives: Sequence[Drive], body: RootMotion | None = None) -> Pose:
     """Let the drives of a performer who stands at rest drive a puppet that stands at rest."""
     puppet.rest()
-    puppet.skin.reset()
+    puppet.surface.reset()
     start = seen(pose())
     puppet.take(Mapping(tuple(drives)), rest_state(start), FRONT, body or RootMotion())
     return start
@@ -292,7 +292,7 @@ def test_a_cartoon_stretches_the_limbs_that_swing_and_rigid_ones_keep_their_leng
 ) -> None:
     def reach(cartoon: float) -> np.ndarray:
         driven(puppet, ARMS)
-        puppet.skin.elasticity = Elasticity(cartoon=cartoon)
+        puppet.surface.elasticity = Elasticity(cartoon=cartoon)
         performer, lengths = Performer(BODY), []
         for number, positions in enumerate(waving(24)):
             puppet.follow(performer.follow(frame(positions, number / 60.0)))
@@ -300,7 +300,7 @@ def test_a_cartoon_stretches_the_limbs_that_swing_and_rigid_ones_keep_their_leng
             assert np.isfinite(vertices).all()
             bones = np.diff(puppet.chains[0], axis=0)
             lengths.append((np.linalg.norm(bones, axis=1).sum(), np.ptp(vertices[:, 0])))
-        puppet.skin.elasticity = Elasticity()
+        puppet.surface.elasticity = Elasticity()
         return np.array(lengths)
 
     rigid, cartoon = reach(0.0), reach(1.0)

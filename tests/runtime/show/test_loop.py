@@ -95,7 +95,7 @@ def loop_of(  # what every show needs, with what a test cares for
 ) -> FrameLoop:
     for puppet in puppets:
         puppet.rest()
-        puppet.skin.reset()
+        puppet.surface.reset()
     performer = Performer(BODY)
     hands = [Mapping(ARMS)] * len(puppets)
     return FrameLoop(

@@ -45,7 +45,7 @@ def rested(puppets: Sequence[Puppet]) -> list[Motion]:
     start = seen(pose())
     for puppet in puppets:
         puppet.rest()
-        puppet.skin.reset()
+        puppet.surface.reset()
         puppet.take(Mapping(ARMS), rest_state(start), FRONT_VIEW, RootMotion())
     return [puppet.deform() for puppet in puppets]
 
