@@ -1,4 +1,4 @@
-"""What is behind the actors: the house, a plain colour to be keyed out, or nothing."""
+"""The picture behind the characters: floor and curtain, a plain colour for keying, or nothing."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Background:
-    """A plain background instead of the house: no floor, no shadow, no light falls on it.
+    """A plain colour instead of floor and curtain, without shadows or reflections.
 
     Attributes:
         red, green, blue: sRGB bytes.
-        alpha: 255, or 0 for a background that is not there.
+        alpha: 255 for opaque, 0 for a transparent picture.
     """
 
     red: int
@@ -21,7 +21,7 @@ class Background:
 
     @property
     def premultiplied(self) -> tuple[float, float, float, float]:
-        """Encoded red, green, blue and alpha in [0, 1], as targets hold them."""
+        """Red, green and blue in sRGB times alpha, and alpha, all in [0, 1]."""
         share = self.alpha / 255.0
         red, green, blue = (
             channel / 255.0 * share for channel in (self.red, self.green, self.blue)
@@ -30,4 +30,4 @@ class Background:
 
 
 NOTHING = Background(0, 0, 0, 0)
-"""What is laid over something else: only the actors are opaque."""
+"""A transparent background: only the characters are opaque."""

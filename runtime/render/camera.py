@@ -12,17 +12,17 @@ Matrix = NDArray[np.float64]
 
 DEFAULT_PITCH = math.radians(8.0)
 HIGHEST_PITCH = math.radians(80.0)
-HEADROOM = 0.42  # how far down, from 0 to 1, actors stand in a picture higher than they need
+HEADROOM = 0.42  # where boxes stand in spare height: 0 in the middle, 1 at the bottom
 LOWEST_PITCH = math.radians(1.0)  # the eye stays above the floor
 
 
 @dataclass(frozen=True, slots=True)
 class Camera:
-    """Where the picture is taken from; right-handed, +Y up, the stage faces +Z.
+    """A perspective camera; right-handed, +Y up, the stage faces +Z.
 
     Attributes:
-        eye: where it stands [m].
-        target: the point in the middle of the picture [m]; orbit turns about it.
+        eye: its position [m].
+        target: the point in the middle of the picture [m]; `orbit` turns about it.
         fov: vertical angle of view [rad].
         near, far: depth range [m].
     """
@@ -35,12 +35,12 @@ class Camera:
 
     @property
     def distance(self) -> float:
-        """From eye to target [m]."""
+        """The distance from eye to target [m]."""
         return math.dist(self.eye, self.target)
 
     @property
     def view_rotation(self) -> Matrix:
-        """(3, 3) turns world directions into the camera's: x right, y up, z toward the viewer."""
+        """(3, 3) world to camera directions: x right, y up, z toward the viewer."""
         back = np.subtract(self.eye, self.target) / self.distance
         right = np.cross((0.0, 1.0, 0.0), back)
         right /= np.linalg.norm(right)
@@ -48,7 +48,7 @@ class Camera:
 
     @property
     def view(self) -> Matrix:
-        """(4, 4) takes world points to the camera's frame."""
+        """(4, 4) world to camera coordinates."""
         matrix = np.eye(4)
         matrix[:3, :3] = self.view_rotation
         matrix[:3, 3] = -self.view_rotation @ np.asarray(self.eye)
@@ -66,17 +66,17 @@ class Camera:
         return matrix
 
     def frame(self, bounds: ArrayLike, aspect: float, *, margin: float = 0.1) -> Camera:
-        """Move, without turning, to where boxes just fill the picture less its margins.
+        """Return a camera with the same orientation in which boxes just fill the picture.
 
         A point (x, y, z) in the camera's axes lies inside the right edge of slope t, seen from
         distance d with the centre at c, when d t + c >= x + z t; likewise for the left edge. The
-        largest of each over all corners give c and the smallest d in closed form. Room that is left
-        over goes above heads rather than below feet.
+        largest of each over all corners give c and the smallest d in closed form. More of the spare
+        height goes above the boxes than below.
 
         Args:
-            bounds: (2, 3) or (B, 2, 3) [m]; least and greatest corners of one box or several.
+            bounds: (2, 3) or (B, 2, 3) [m]; least and greatest corners of one or more boxes.
             aspect: width over height of the picture.
-            margin: free part of the picture on each side, in [0, 0.5).
+            margin: free share of the picture on each side, in [0, 0.5).
         """
         corners = box_corners(np.asarray(bounds, dtype=np.float64).reshape(-1, 2, 3))
         seen = corners @ self.view_rotation.T  # (8 B, 3)
@@ -92,7 +92,7 @@ class Camera:
         return _placed(self, eye, target)
 
     def orbit(self, yaw: float, pitch: float) -> Camera:
-        """Turn about the target by angles [rad]: yaw to the right, pitch upward."""
+        """Return a camera turned about the target by angles [rad]: yaw to the right, pitch up."""
         back = np.subtract(self.eye, self.target) / self.distance
         azimuth = math.atan2(back[0], back[2]) + yaw
         height = min(max(math.asin(back[1]) + pitch, LOWEST_PITCH), HIGHEST_PITCH)
@@ -101,20 +101,20 @@ class Camera:
         )
 
     def pan(self, right: float, up: float) -> Camera:
-        """Shift eye and target together, in heights of the picture at the target."""
+        """Return a camera shifted sideways and up, in picture heights at the target."""
         height = 2.0 * self.distance * math.tan(self.fov / 2.0)
         shift = height * (right * self.view_rotation[0] + up * self.view_rotation[1])
         return _placed(self, np.add(self.eye, shift), np.add(self.target, shift))
 
     def zoom(self, factor: float) -> Camera:
-        """Bring the target `factor` times closer."""
+        """Return a camera `factor` times closer to the target."""
         distance = min(max(self.distance / factor, 0.05), 500.0)
         back = np.subtract(self.eye, self.target) / self.distance
         return _placed(self, np.asarray(self.target) + distance * back, self.target)
 
 
 def front_camera(*, pitch: float = DEFAULT_PITCH, fov: float = math.radians(26.0)) -> Camera:
-    """Straight from the front, slightly raised: the view in which a performer is matched."""
+    """Return a slightly raised camera in front of the stage: the view used for matching."""
     target = np.array([0.0, 0.8, 0.0])
     return _placed(Camera(fov=fov), target + 5.0 * _toward(0.0, pitch), target)
 
@@ -144,7 +144,7 @@ def box_corners(boxes: NDArray[np.float64]) -> NDArray[np.float64]:
 def _tightest(
     offset: NDArray[np.float64], depth: NDArray[np.float64], slope: float
 ) -> tuple[float, float]:
-    """Centre and distance from which points just touch both edges of a wedge."""
+    """Return centre and distance at which points just touch both edges of the view's wedge."""
     greatest = float((offset + depth * slope).max())
     least = float((-offset + depth * slope).max())
     return (greatest - least) / 2.0, (greatest + least) / (2.0 * slope)

@@ -1,4 +1,4 @@
-"""The actors' names, set in small letters on the edge of the stage."""
+"""Captions: the characters' names in small letters at their feet."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ LONGEST = 40
 
 
 class CaptionPainter:
-    """Draws short names below points of the picture; keeps the letters it has set."""
+    """Draws short texts below points of the picture; keeps a texture of each text."""
 
     def __init__(self, context: moderngl.Context) -> None:
         self._context = context
         self._program = link(context, "caption", "caption")
         self._array = context.vertex_array(self._program, [])
-        self._set: dict[tuple[str, int], moderngl.Texture] = {}
+        self._textures: dict[tuple[str, int], moderngl.Texture] = {}
 
     def draw(self, text: str, at: tuple[float, float], target: moderngl.Framebuffer) -> None:
-        """Draw `text` centred on and just below the pixel `at` (from the lower left)."""
+        """Draw `text` just below the pixel `at` (from the lower left), centred on it."""
         width, height = target.size
         points = max(round(height * 0.026), 8)
         letters = self._letters(text[:LONGEST], points)
@@ -38,20 +38,20 @@ class CaptionPainter:
 
     def _letters(self, text: str, points: int) -> moderngl.Texture:
         key = (text, points)
-        if key not in self._set:
+        if key not in self._textures:
             pixels = _typeset(text, points)
             texture = self._context.texture(pixels.shape[::-1], 1, pixels.tobytes(), alignment=1)
             texture.filter = (moderngl.NEAREST, moderngl.NEAREST)
-            self._set[key] = texture
-        return self._set[key]
+            self._textures[key] = texture
+        return self._textures[key]
 
     def release(self) -> None:
         """Free its GL objects."""
-        release_all(self._array, self._program, *self._set.values())
+        release_all(self._array, self._program, *self._textures.values())
 
 
 def _typeset(text: str, points: int) -> NDArray[np.uint8]:
-    """Spaced letters (h, w), 255 where there is ink; Pillow's own font, so alike everywhere."""
+    """Return spaced letters (h, w), 255 where there is ink, in Pillow's font: alike everywhere."""
     font = ImageFont.load_default(points)
     spacing = points * 0.10
     shown = text or " "

@@ -1,4 +1,4 @@
-"""OpenGL 3.3 contexts: one without a screen (EGL), one over a window's."""
+"""OpenGL 3.3 contexts: a headless one through EGL, and one that wraps a window's context."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from devices.errors import InputError
 
 INSTALL_HINT = "on Debian or Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri"
 _headless: WeakSet[moderngl.Context] = WeakSet()
-EGL_DEVICES = 4  # a machine lists its GPUs first and Mesa's software device last
+EGL_DEVICES = 4  # devices that are tried; GPUs come first and Mesa's software device last
 
 
 def headless_context(*, libegl: str = "libEGL.so.1", libgl: str = "libGL.so.1") -> moderngl.Context:
-    """An OpenGL 3.3 core context that needs no display, on a GPU or on Mesa's llvmpipe.
+    """Return an OpenGL 3.3 core context without a display, on a GPU or on Mesa's llvmpipe.
 
-    Linux asks EGL by the names that a plain Debian has; Windows and macOS use their own hidden
-    window. EGL devices that refuse (no permission, no driver) are passed over for the next one.
-    End it with `release_headless`.
+    On Linux it loads EGL by the library names of a plain Debian; on Windows and macOS moderngl
+    makes a hidden window. An EGL device that refuses (no permission, no driver) is skipped.
+    End the context with `release_headless`.
 
     Raises:
-        InputError: there is no EGL, GL or driver; the message says what to install.
+        InputError: EGL, GL or a driver is missing; the message names the packages to install.
     """
     if not sys.platform.startswith("linux"):
         return _other_platform()
@@ -46,14 +46,14 @@ def headless_context(*, libegl: str = "libEGL.so.1", libgl: str = "libGL.so.1") 
 
 
 def leave_headless() -> None:
-    """Make no headless context current: X11 ends a process whose thread then opens a window."""
+    """Make no headless context current; otherwise X11 ends a process that opens a window."""
     for context in _headless:
         leave: Callable[..., None] = context.__exit__
         leave(None, None, None)
 
 
 def release_headless(context: moderngl.Context) -> None:
-    """End a context that `headless_context` made; a plain release would leave it current."""
+    """Release a context of `headless_context`; a plain release would leave it current."""
     leave_headless()
     _headless.discard(context)
     context.release()
@@ -71,7 +71,7 @@ def _other_platform() -> moderngl.Context:
 
 
 class _Loader:
-    """Finds GL functions through the library that made the current context."""
+    """Looks up GL functions in the library that made the current context."""
 
     def __init__(self, address_of: Callable[[str], Any]) -> None:
         self._address_of = address_of
@@ -80,11 +80,11 @@ class _Loader:
         return int(self._address_of(name) or 0)
 
     def release(self) -> None:
-        """The window owns the context and ends it."""
+        """Do nothing: the window owns the context and ends it."""
 
 
 def current_context(address_of: Callable[[str], Any]) -> moderngl.Context:
-    """Wrap the GL context that is current on this thread; `address_of` looks functions up.
+    """Wrap the GL context that is current on this thread; `address_of` finds GL functions.
 
     Raises:
         InputError: the current context is older than OpenGL 3.3.
@@ -100,13 +100,13 @@ def current_context(address_of: Callable[[str], Any]) -> moderngl.Context:
 
 
 def renderer_name(context: moderngl.Context) -> str:
-    """What draws, as the driver calls it, in one line."""
+    """Return the driver's name for the renderer, and its OpenGL version, in one line."""
     with suppress(KeyError):
         return f"{context.info['GL_RENDERER']}, OpenGL {context.info['GL_VERSION']}"
     return "unknown renderer"
 
 
 def is_software(context: moderngl.Context) -> bool:
-    """Whether a processor draws instead of a GPU."""
+    """Return whether the CPU draws instead of a GPU."""
     name = renderer_name(context).lower()
     return any(word in name for word in ("llvmpipe", "softpipe", "swrast", "software"))

@@ -1,4 +1,4 @@
-"""Which EGL devices a machine has, asked of the library itself: it needs no context."""
+"""List the EGL devices of a machine, without making a GL context."""
 
 from __future__ import annotations
 
@@ -17,17 +17,17 @@ _VENDOR, _VERSION = 0x3053, 0x3054
 
 @dataclass(frozen=True, slots=True)
 class EglDevice:
-    """An EGL device; vendor and version are empty where it lets nobody in."""
+    """An EGL device; vendor and version are empty where it refuses to initialise."""
 
     vendor: str
     version: str
 
 
 def egl_devices(library: str = "libEGL.so.1") -> list[EglDevice]:
-    """The devices in EGL's order, GPUs first, Mesa's software device last.
+    """Return the devices in EGL's order: GPUs first, Mesa's software device last.
 
     Raises:
-        InputError: there is no EGL, or one that cannot list its devices.
+        InputError: EGL is missing, or cannot list its devices.
     """
     try:
         egl = ctypes.CDLL(library)
@@ -58,7 +58,7 @@ _ARGUMENTS: dict[bytes, tuple[type, ...]] = {
 
 
 def _device(egl: ctypes.CDLL, display_of: Callable[..., Any], device: int | None) -> EglDevice:
-    # It stays initialised: this display may be the one of a context that somebody else uses.
+    # The display stays initialised: a context elsewhere in the process may use it.
     display = ctypes.c_void_p(display_of(_PLATFORM_DEVICE, device, None))
     if not display or not egl.eglInitialize(display, None, None):
         return EglDevice("", "")

@@ -1,4 +1,4 @@
-"""Shadow map, contact shadows and reflections of the actors on the stage floor."""
+"""Shadows, contact shadows and reflections of the characters on the stage floor."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from runtime.render.actor import Actor
 from runtime.render.frame import SHADOW_SIZE, Lighting
 from runtime.render.programs import link, release_all
+from runtime.render.stage_character import StageCharacter
 
 MASK_SIZE = (320, 192)
 HEIGHT_SIZE = (256, 256)
-REFLECTION_REACH = 0.9  # how far in front of an actor the floor may still show it [m]
+REFLECTION_REACH = 0.9  # how far in front of a character the floor still reflects it [m]
 
 
 class ShadowMaps:
-    """What the key light sees and what the floor sees of the actors."""
+    """Depth maps of the characters: seen from the key light, and from below the floor."""
 
     def __init__(self, context: moderngl.Context) -> None:
         self.key = context.depth_texture((SHADOW_SIZE, SHADOW_SIZE))
@@ -33,20 +33,22 @@ class ShadowMaps:
         self._key_target = context.framebuffer(depth_attachment=self.key)
         self._height_target = context.framebuffer(depth_attachment=self.height)
 
-    def draw(self, actors: Sequence[Actor], light: Lighting, *, contact: bool) -> None:
-        """Draw the actors' depth; the view from below only where there is a floor."""
-        self._pass(self._key_target, actors, light.to_shadow_clip)
+    def draw(self, characters: Sequence[StageCharacter], light: Lighting, *, contact: bool) -> None:
+        """Draw the depth maps; the one from below only with `contact`, where there is a floor."""
+        self._pass(self._key_target, characters, light.to_shadow_clip)
         if contact:
-            self._pass(self._height_target, actors, light.to_height_clip)
+            self._pass(self._height_target, characters, light.to_height_clip)
 
     @staticmethod
     def _pass(
-        target: moderngl.Framebuffer, actors: Sequence[Actor], to_clip: NDArray[np.float64]
+        target: moderngl.Framebuffer,
+        characters: Sequence[StageCharacter],
+        to_clip: NDArray[np.float64],
     ) -> None:
         target.use()
         target.clear(depth=1.0)
-        for actor in actors:
-            actor.draw_depth(to_clip)
+        for character in characters:
+            character.draw_depth(to_clip)
 
     def release(self) -> None:
         """Free its GL objects."""
@@ -54,7 +56,7 @@ class ShadowMaps:
 
 
 class Floor:
-    """Lays shadows, contact shadows and reflections over the backdrop's boards."""
+    """Draws shadows, contact shadows and reflections over the floor of the backdrop."""
 
     def __init__(self, context: moderngl.Context) -> None:
         self._context = context
@@ -72,14 +74,14 @@ class Floor:
         self._array = context.vertex_array(self._program, [])
 
     def draw_mask(self, maps: ShadowMaps) -> None:
-        """Work out, for each point of the floor, how much light the actors leave it."""
+        """Compute how much key light and ambient light reaches each point of the floor."""
         self._mask_target.use()
         maps.key.use(0)
         maps.height.use(1)
         self._mask_array.render(moderngl.TRIANGLES, vertices=3)
 
     def draw(self, target: moderngl.Framebuffer, reflection: moderngl.Texture) -> None:
-        """Darken and add to `target`, which holds the backdrop."""
+        """Darken `target`, which holds the backdrop, and add the reflections to it."""
         target.use()
         self._mask.use(0)
         reflection.use(1)

@@ -1,4 +1,4 @@
-"""What every pass of one frame shares: camera, key light, floor and pools of light."""
+"""The uniform block that all render passes share: camera, key light, floor, pools of light."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ FRAME = np.dtype(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Lighting:
-    """Where the light falls for the boxes that the actors fill now.
+    """The shadow map, the height map and the floor area, fitted to the characters' boxes.
 
     Attributes:
         to_shadow_clip: (4, 4) world to the clip space of the shadow map.
-        to_height_clip: (4, 4) world to the clip space of the map seen from below the floor.
-        floor: (4,) least x, least z, width and depth [m] of the floor that shadows reach.
+        to_height_clip: (4, 4) world to the clip space of the height map, seen from below the floor.
+        floor: (4,) least x, least z, width and depth [m] of the floor area with shadows.
         texel: size of one texel of the shadow map [m].
     """
 
@@ -44,15 +44,15 @@ class Lighting:
     texel: float
 
 
-CONTACT_HEIGHT = 0.32  # what hangs higher than this above the floor leaves no contact shadow [m]
+CONTACT_HEIGHT = 0.32  # surfaces higher above the floor leave no contact shadow [m]
 SHADOW_SIZE = 1024
 
 
 def lighting(boxes: NDArray[np.float64]) -> Lighting:
     """Fit shadow and height maps around boxes (B, 2, 3).
 
-    Extents are rounded outward to whole steps, so that the maps stand still while actors move
-    within them and shadows do not shimmer.
+    Extents are rounded outward to whole steps: small movements do not change the maps, so shadows
+    do not shimmer.
     """
     corners = box_corners(boxes)
     landing = corners - KEY_DIRECTION * (corners[:, 1:2] / KEY_DIRECTION[1])
@@ -106,28 +106,29 @@ def frame_block(
     pools: NDArray[np.float64],
     *,
     on_floor: bool,
-    mirrored: bool = False,
+    reflected: bool = False,
 ) -> NDArray[np.void]:
-    """The uniform block of one frame; `mirrored` is the picture that the floor reflects.
+    """Return the uniform block of one frame.
 
     Args:
-        camera: where the picture is taken from.
+        camera: the camera.
         size: width and height of the picture [px].
-        light: as `lighting` fits it.
+        light: the result of `lighting`.
         pools: (P, 3) x, z and radius [m] of each pool of light.
-        on_floor: whether there is a floor, which hides what lies below it.
+        on_floor: whether there is a floor; a floor hides everything below it.
+        reflected: whether the block is for the reflection in the floor, upside down.
     """
     width, height = size
-    flip = np.diag([1.0, -1.0 if mirrored else 1.0, 1.0, 1.0])
+    flip = np.diag([1.0, -1.0 if reflected else 1.0, 1.0, 1.0])
     view_projection = camera.projection(width / height) @ camera.view @ flip
     half = np.eye(4) * (0.5, 0.5, 0.5, 1.0)
-    half[:3, 3] = 0.5, 0.5, 0.4985  # a little nearer to the light: no surface shades itself
+    half[:3, 3] = 0.5, 0.5, 0.4985  # a small offset toward the light: no surface shadows itself
     low, high = pools[:, :2].min(axis=0), pools[:, :2].max(axis=0)
     block = np.zeros((), dtype=FRAME)
     block["view_projection"] = view_projection.T
     block["inverse_view_projection"] = np.linalg.inv(view_projection).T
     block["light"] = (half @ light.to_shadow_clip).T
-    block["eye"] = (*(flip[:3, :3] @ np.asarray(camera.eye)), -1.0 if mirrored else 1.0)
+    block["eye"] = (*(flip[:3, :3] @ np.asarray(camera.eye)), -1.0 if reflected else 1.0)
     block["key"] = (*KEY_DIRECTION, float(on_floor))
     block["floor_area"] = (*light.floor[:2], *(1.0 / light.floor[2:]))
     radius = max(3.6, 0.62 * float((high - low).max()) + 2.6)
@@ -140,7 +141,13 @@ def frame_block(
 def covered(
     camera: Camera, size: tuple[int, int], boxes: NDArray[np.float64]
 ) -> tuple[int, int, int, int]:
-    """The part of the picture that boxes (B, 2, 3) can touch: left, bottom, width, height [px]."""
+    """Return the part of the picture that boxes can cover: left, bottom, width, height [px].
+
+    Args:
+        camera: the camera.
+        size: width and height of the picture [px].
+        boxes: (B, 2, 3) [m] least and greatest corners.
+    """
     width, height = size
     points = np.pad(box_corners(boxes), ((0, 0), (0, 1)), constant_values=1.0)
     clip = points @ (camera.projection(width / height) @ camera.view).T

@@ -1,4 +1,4 @@
-"""The performer's skeleton in a round mirror at a corner of the picture."""
+"""The inset: the performer's skeleton in a small round frame at the upper left of the picture."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ from numpy.typing import ArrayLike, NDArray
 from runtime.render.programs import link, release_all
 from runtime.render.tubes import TubePainter, Tubes, tubes
 
-IDLE = np.array([0.62, 0.60, 0.56])  # a joint that drives nothing: bare wood
-SHRINK = 0.01  # part of the spare room given up at each update
-FILL = 0.74  # part of the mirror's radius that the performer reaches
+IDLE = np.array([0.62, 0.60, 0.56])  # linear RGB of a joint that drives nothing
+SHRINK = 0.01  # share of the spare size that the view gives up at each update
+FILL = 0.74  # share of the inset's radius that the performer fills
 
 
 class SkeletonInset:
-    """A performer's skeleton, framed so that it fits the mirror without jitter.
+    """A performer's skeleton, scaled and centred so that it fits the inset without jitter.
 
-    The frame follows only as far as the performer would leave it, grows at once and shrinks
-    slowly. It advances once an update, not with a clock, so that replays draw the same pictures.
+    The view moves only when the performer would leave it, grows at once and shrinks slowly. It
+    advances once an update, not with a clock, so replays draw the same pictures.
 
     Attributes:
         parents: (J,) int, -1 at the root.
@@ -38,13 +38,13 @@ class SkeletonInset:
         dimmed: NDArray[np.bool] | None = None,
         view_rotation: NDArray[np.float64] | None = None,
     ) -> None:
-        """Take one frame of the performer.
+        """Show one frame of the performer.
 
         Args:
-            positions: (J, 3) [m]; NaN where a joint is not known: it is left out.
-            colours: (J, 3) linear RGB; NaN rows or None: the joint drives nothing.
-            dimmed: (J,) joints that were filled in rather than seen.
-            view_rotation: (3, 3) world to the viewer's axes; None: from the front.
+            positions: (J, 3) [m]; joints with NaN are not drawn.
+            colours: (J, 3) linear RGB; NaN rows, or None for all: the joint drives nothing.
+            dimmed: (J,) joints that the fill stage estimated; they are drawn faintly.
+            view_rotation: (3, 3) world to the viewer's axes; None for the front view.
         """
         seen = positions if view_rotation is None else positions @ view_rotation.T
         known = np.asarray(np.isfinite(seen).all(axis=1), dtype=np.bool)
@@ -73,7 +73,7 @@ class SkeletonInset:
 
     @property
     def capsules(self) -> Tubes:
-        """(K, 13) capsules in the mirror's frame: the unit circle, viewer on +z."""
+        """(K, 13) capsules in the inset's coordinates: a unit circle, the viewer on +z."""
         return self._capsules
 
 
@@ -84,12 +84,12 @@ def _skeleton_tubes(
     dimmed: NDArray[np.bool],
     known: NDArray[np.bool],
 ) -> Tubes:
-    """Bones from parent to child in the child's colour, and beads; far ones first."""
+    """Return bones from parent to child in the child's colour, and beads; far ones first."""
     driven = np.asarray(np.isfinite(colours).all(axis=1), dtype=np.bool)
     colour = np.where(driven[:, None], colours, IDLE)
     opacity = np.where(dimmed, 0.28, 1.0)
     child = np.flatnonzero((parents >= 0) & known & known[parents])
-    crowd = np.clip(25.0 / max(len(child), 1), 0.45, 1.0)  # thin where joints are many
+    crowd = np.clip(25.0 / max(len(child), 1), 0.45, 1.0)  # thinner where there are many joints
     width = np.where(driven, 0.046, 0.030) * crowd
     bones = tubes(
         joints[parents[child]],
@@ -114,16 +114,16 @@ def _skeleton_tubes(
 
 
 class InsetPainter:
-    """Draws an inset's mirror and skeleton into a corner of the bound framebuffer."""
+    """Draws an inset's disc and skeleton into a corner of the bound framebuffer."""
 
     def __init__(self, context: moderngl.Context) -> None:
-        self._program = link(context, "whole", "mirror_disc")
+        self._program = link(context, "whole", "inset_disc")
         self._array = context.vertex_array(self._program, [])
 
     def draw(
         self, inset: SkeletonInset, painter: TubePainter, target: moderngl.Framebuffer
     ) -> None:
-        """Draw at the upper left, a third of the picture's height across."""
+        """Draw at the upper left; the diameter is a third of the picture's height."""
         width, height = target.size
         radius = max(round(0.165 * min(height, width)), 8)
         centre = (radius * 1.16, height - radius * 1.16)

@@ -1,4 +1,4 @@
-"""Shader programs, put together from the files in shaders/."""
+"""Compile shader programs from the files in shaders/."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ def _read(name: str) -> str:
 
 
 class Releasable(Protocol):
-    """Something that holds GL objects."""
+    """An owner of GL objects."""
 
     def release(self) -> None:
-        """Free them."""
+        """Free the GL objects."""
 
 
 def release_all(*things: Releasable | None) -> None:
-    """Free what is there, in the order given."""
+    """Release the things that are not None, in the order given."""
     for thing in things:
         if thing is not None:
             thing.release()

@@ -1,4 +1,4 @@
-"""Normals of a deforming surface: smooth across the file's seams, sharp at the shape's creases."""
+"""Vertex normals of a deforming surface: smooth across file seams, sharp at creases."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from solvers.kernels.compiled import kernel
 
 CREASE = math.radians(62.0)
 
-# Faces are worked on LANES at a time, in a flat array of 6 rows of LANES numbers. With a single
-# array and constant strides the compiler can prove that nothing overlaps, which it needs in order
-# to use vector instructions (as solvers/deform/rotation_fit.py does).
+# The kernels process LANES faces at a time, in one flat array of 6 rows of LANES numbers. With one
+# array and constant strides the compiler can prove that nothing overlaps, and so use vector
+# instructions (as in solvers/deform/rotation_fit.py).
 LANES = 64
 
-_FLAT = 1e-28  # squared sine of an angle below which a face's normal is only what rounding left
+_FLAT = 1e-28  # squared sine of a face's angle below which its normal is only rounding error
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class DrawVertices:
-    """What is drawn, split where the file has a seam or the rest shape a crease.
+    """Vertices for drawing, split at the file's seams and at creases of the rest shape.
 
     Attributes:
-        welded: (D,) int32; welded vertex that each drawn vertex follows.
-        file: (D,) int64; file vertex that it takes colour and texture coordinates from.
-        group: (D,) int32; smoothing group that it takes its normal from.
+        welded: (D,) int32; the welded vertex that gives each drawn vertex its position.
+        file: (D,) int64; the file vertex that gives it colour and texture coordinates.
+        group: (D,) int32; the smoothing group that gives it its normal.
         triangles: (F, 3) int32 into the D drawn vertices, in the character's face order.
         faces: (F, 3) int32 into the welded vertices.
-        corner_group: (F, 3) int32; smoothing group that each corner of a face adds to.
+        corner_group: (F, 3) int32; the smoothing group of each corner of a face.
     """
 
     welded: NDArray[np.int32]
@@ -66,10 +66,10 @@ def split_vertices(character: Character, *, crease: float = CREASE) -> DrawVerti
 def smoothing_groups(
     vertices: NDArray[np.float64], faces: NDArray[np.int32], crease: float
 ) -> NDArray[np.int32]:
-    """Group number of each corner (3 F,): corners at one vertex joined across its smooth edges.
+    """Return the group number of each corner (3 F,); smooth edges join the corners at a vertex.
 
-    Faces that share an edge but run around it the same way disagree about inside and outside;
-    their normals would cancel, so that edge counts as sharp.
+    Two faces that run along their common edge in the same direction disagree about inside and
+    outside. Their normals would cancel, so such an edge counts as sharp.
     """
     count = len(faces)
     corner = np.arange(3 * count).reshape(-1, 3)
@@ -103,7 +103,7 @@ def _unit_face_normals(
 
 
 def is_closed(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> bool:
-    """Whether no inside can be seen: every piece watertight and turned outward."""
+    """Return whether every connected piece is watertight and faces outward."""
     tail, head = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     count = len(vertices)
     forward = np.sort(tail.astype(np.int64) * count + head)
@@ -118,11 +118,11 @@ def is_closed(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> bool:
 
 
 class DeformingNormals:
-    """Fills the vertex buffer of a deforming surface; keeps its scratch from frame to frame.
+    """Fills the vertex buffer of a deforming surface; reuses its arrays from frame to frame.
 
-    A normal is the sum of its smoothing group's face normals, each weighted by the face's angle
-    there, so that it does not depend on how the surface was cut into triangles. Sums run in the
-    order of the faces: two runs agree to the last bit.
+    A normal is the sum of the face normals of its smoothing group, each weighted by the face's
+    angle at the vertex, so it does not depend on the triangulation. Sums run in the order of the
+    faces: two runs agree to the last bit.
 
     Source: Thurmer and Wuthrich, Computing Vertex Normals from Polygonal Facets, 1998, section 2.
     """
@@ -134,10 +134,10 @@ class DeformingNormals:
         self._out = np.zeros((len(split.welded), 6), dtype=np.float32)
 
     def fill(self, vertices: NDArray[np.float64]) -> NDArray[np.float32]:
-        """Position and unit normal (D, 6) of each drawn vertex, for welded vertices (N, 3).
+        """Return position and unit normal (D, 6) of each drawn vertex for welded vertices (N, 3).
 
-        A normal is zero where all faces of its group are without area. The array is overwritten
-        by the next call.
+        A normal is zero where no face of its group has an area. The next call overwrites the
+        array.
         """
         split = self._split
         _sum_corners(vertices, split.faces, split.corner_group, self._lanes, self._sums)
@@ -147,7 +147,7 @@ class DeformingNormals:
 
 @njit(inline="always", error_model="numpy")
 def _angle(x: float, y: float) -> float:
-    """The angle in [0, pi] of (x, y) with y > 0, to 2e-8; atan2 took half the time here.
+    """Return the angle in [0, pi] of (x, y) with y > 0, to 2e-8; atan2 took half the time here.
 
     Source: Abramowitz and Stegun, Handbook of Mathematical Functions, 1964, 4.4.49.
     """

@@ -1,4 +1,4 @@
-"""The puppet stage: actors under a warm key and cool rims, in a dark house, on a boarded floor."""
+"""The stage: draws characters on a lit floor in front of a curtain, or on a plain background."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from devices.errors import InputError
 from runtime.characters.character import Character
-from runtime.render.actor import Actor, ActorPrograms
 from runtime.render.background import Background
 from runtime.render.camera import Camera
 from runtime.render.caption import CaptionPainter
@@ -16,6 +15,7 @@ from runtime.render.floor import Floor, ShadowMaps
 from runtime.render.frame import FRAME, MAX_POOLS, Lighting, covered, frame_block, lighting
 from runtime.render.inset import InsetPainter, SkeletonInset
 from runtime.render.programs import FRAME_BINDING, link, release_all
+from runtime.render.stage_character import CharacterPrograms, StageCharacter
 from runtime.render.targets import Targets
 from runtime.render.tubes import TubePainter
 
@@ -26,21 +26,21 @@ DIM = (moderngl.ZERO, moderngl.SRC_ALPHA)
 
 
 class Stage:
-    """Draws actors into a picture of its own, for a window and for files alike.
+    """Draws characters into a framebuffer, for a window and for files alike.
 
-    One path: shadow and contact maps, the actors with multisampling, then backdrop, floor, actors,
-    chains, captions and inset laid over one another in the display's encoding. The backdrop is
-    kept while camera and pools of light stand still.
+    The passes: shadow and contact maps; the characters with multisampling; then backdrop, floor,
+    characters, chains, captions and inset over one another, in sRGB. The backdrop is kept while
+    the camera and the pools of light stay the same.
 
     Args:
         context: an OpenGL 3.3 context, current on this thread.
         size: width and height of the picture [px].
-        samples: samples a pixel on the actors' edges; fewer where the driver has fewer.
-        background: what is there instead of the house; its alpha is `read` straight.
+        samples: samples a pixel at the characters' edges; limited to the driver's maximum.
+        background: a plain background instead of floor and curtain; `read` returns its alpha.
 
     Attributes:
-        brightness: 1, down to 0: the picture is black, or where there is no house the background
-            alone, so that whoever keys it out sees nothing of the actors.
+        brightness: from 1 to 0. At 0 the picture is black; with a plain background it is the
+            background alone, so that a keyed picture shows no characters.
     """
 
     def __init__(
@@ -55,12 +55,12 @@ class Stage:
         self._context = context
         self._samples = min(samples, context.max_samples)
         self._background = background
-        self._actors: list[Actor] = []
-        self._programs = ActorPrograms(
+        self._characters: list[StageCharacter] = []
+        self._programs = CharacterPrograms(
             depth=link(context, "depth", "depth"),
             plain=link(context, "character", "character"),
             textured=link(context, "character", "character", defines=("TEXTURED",)),
-            mirror=link(context, "character", "mirror"),
+            reflection=link(context, "character", "reflection"),
         )
         self._programs.textured["image"] = 1
         self._maps = ShadowMaps(context)
@@ -75,7 +75,7 @@ class Stage:
         self._fill_program = link(context, "whole", "fill")
         self._fill_array = context.vertex_array(self._fill_program, [])
         self._frame = context.buffer(reserve=FRAME.itemsize, dynamic=True)
-        self._mirrored = context.buffer(reserve=FRAME.itemsize, dynamic=True)
+        self._reflected_frame = context.buffer(reserve=FRAME.itemsize, dynamic=True)
         self._targets = self._make_targets(size)
         self._kept_backdrop = b""
         self._seen = (0, 0, *size)
@@ -101,8 +101,8 @@ class Stage:
 
     @property
     def boxes(self) -> NDArray[np.float64]:
-        """(A, 2, 3) [m] least and greatest corner of what each actor fills now."""
-        return np.array([actor.box for actor in self._actors]).reshape(-1, 2, 3)
+        """(A, 2, 3) [m] the bounding box of each character now: least and greatest corner."""
+        return np.array([character.box for character in self._characters]).reshape(-1, 2, 3)
 
     def add(
         self,
@@ -110,46 +110,50 @@ class Stage:
         *,
         position: ArrayLike = (0.0, 0.0, 0.0),
         caption: str = "",
-    ) -> Actor:
-        """Put a character on the stage, in its rest pose, in a pool of light of its own.
+    ) -> StageCharacter:
+        """Put a character in its rest pose on the stage, with its own pool of light.
 
         Args:
-            character: what to draw.
-            position: (3,) [m] where its origin stands.
-            caption: a name shown at its feet, or nothing.
+            character: the character to draw.
+            position: (3,) [m] the place of its origin.
+            caption: a text at its feet; empty for none.
 
         Raises:
-            InputError: the stage has as many actors as it can light.
+            InputError: the stage has its maximum number of characters.
         """
-        if len(self._actors) == MAX_POOLS:
+        if len(self._characters) == MAX_POOLS:
             raise InputError(f"a stage holds {MAX_POOLS} characters at most")
-        actor = Actor(self._context, self._programs, character, position, caption)
-        self._actors.append(actor)
-        return actor
+        added = StageCharacter(self._context, self._programs, character, position, caption)
+        self._characters.append(added)
+        return added
 
-    def remove(self, actor: Actor) -> None:
-        """Take an actor off the stage and free what it holds."""
-        self._actors.remove(actor)
-        actor.release()
+    def remove(self, character: StageCharacter) -> None:
+        """Remove a character and free its GL objects."""
+        self._characters.remove(character)
+        character.release()
 
     def resize(self, size: tuple[int, int]) -> None:
-        """Draw pictures of another size from now on."""
+        """Change the size of the picture [px]."""
         if tuple(size) != self.size:
             self._targets.release()
             self._targets = self._make_targets(size)
             self._kept_backdrop = b""
 
     def draw(self, camera: Camera, inset: SkeletonInset | None = None) -> None:
-        """Draw the actors as they are now, seen by `camera`; `inset` shows the performer."""
-        light = lighting(self.boxes if self._actors else _EMPTY)
-        pools = np.array([actor.pool for actor in self._actors]) if self._actors else _NO_POOLS
+        """Draw the characters as they are now, seen by `camera`; `inset` shows the performer."""
+        light = lighting(self.boxes if self._characters else _EMPTY)
+        pools = (
+            np.array([character.pool for character in self._characters])
+            if self._characters
+            else _NO_POOLS
+        )
         self._seen = covered(camera, self.size, self.boxes)
         self._share(camera, light, pools)
         self._context.enable_only(moderngl.DEPTH_TEST)
-        self._maps.draw(self._actors, light, contact=self._background is None)
-        self._draw_actors(light)
+        self._maps.draw(self._characters, light, contact=self._background is None)
+        self._draw_characters(light)
         if self._background is None:
-            self._draw_house(camera, pools)
+            self._draw_floor_and_curtain(camera, pools)
         else:
             self._targets.picture.clear()
         self._lay_over(camera, inset)
@@ -159,40 +163,40 @@ class Stage:
             self._fill(UNDER, self._background.premultiplied)
 
     def _share(self, camera: Camera, light: Lighting, pools: NDArray[np.float64]) -> None:
-        for buffer, mirrored in ((self._frame, False), (self._mirrored, True)):
+        for buffer, reflected in ((self._frame, False), (self._reflected_frame, True)):
             block = frame_block(
                 camera,
                 self.size,
                 light,
                 pools,
                 on_floor=self._background is None,
-                mirrored=mirrored,
+                reflected=reflected,
             )
             buffer.orphan()
             buffer.write(block.tobytes())
         self._frame.bind_to_uniform_block(FRAME_BINDING)
 
-    def _draw_actors(self, light: Lighting) -> None:
+    def _draw_characters(self, light: Lighting) -> None:
         for program in (self._programs.plain, self._programs.textured):
             program["shadow_texel"] = 1.8 * light.texel
         self._maps.key.use(0)
-        self._targets.actors.use()
-        self._targets.actors.clear(viewport=self._seen)
+        self._targets.characters.use()
+        self._targets.characters.clear(viewport=self._seen)
         self._context.enable_direct(CLIP_DISTANCE0)
-        for actor in self._actors:
-            actor.draw()
+        for character in self._characters:
+            character.draw()
         self._context.disable_direct(CLIP_DISTANCE0)
         self._targets.resolved.scissor = self._seen
         self._targets.resolved.use()
-        self._context.copy_framebuffer(self._targets.resolved, self._targets.actors)
+        self._context.copy_framebuffer(self._targets.resolved, self._targets.characters)
 
-    def _draw_house(self, camera: Camera, pools: NDArray[np.float64]) -> None:
-        self._mirrored.bind_to_uniform_block(FRAME_BINDING)
+    def _draw_floor_and_curtain(self, camera: Camera, pools: NDArray[np.float64]) -> None:
+        self._reflected_frame.bind_to_uniform_block(FRAME_BINDING)
         self._targets.reflection.use()
         self._targets.reflection.clear()
         self._context.enable_direct(CLIP_DISTANCE0)
-        for actor in self._actors:
-            actor.draw_mirrored()
+        for character in self._characters:
+            character.draw_reflection()
         self._context.disable_direct(CLIP_DISTANCE0)
         self._frame.bind_to_uniform_block(FRAME_BINDING)
         self._context.disable(moderngl.DEPTH_TEST)
@@ -217,9 +221,9 @@ class Stage:
         picture.scissor = (0, 0, width, height)
         to_clip = camera.projection(self.aspect) @ camera.view
         pixels = height / (2.0 * np.tan(camera.fov / 2.0))
-        for actor in self._actors:
+        for character in self._characters:
             self._tubes.draw(
-                actor.tubes, to_clip, size=self.size, pixels=pixels, offset=actor.position
+                character.tubes, to_clip, size=self.size, pixels=pixels, offset=character.position
             )
         self._draw_captions(to_clip)
         if inset is not None:
@@ -236,22 +240,22 @@ class Stage:
         self._fill_array.render(moderngl.TRIANGLES, vertices=3)
 
     def _draw_captions(self, to_clip: NDArray[np.float64]) -> None:
-        for actor in self._actors:
-            if actor.caption:
-                depth = max(other.rest_box[1, 2] for other in self._actors)
-                near = actor.position[2] + depth + 0.16
-                foot = to_clip @ [actor.pool[0], 0.0, near, 1.0]
+        for character in self._characters:
+            if character.caption:
+                depth = max(other.rest_box[1, 2] for other in self._characters)
+                near = character.position[2] + depth + 0.16
+                foot = to_clip @ [character.pool[0], 0.0, near, 1.0]
                 at = (foot[:2] / foot[3] * 0.5 + 0.5) * self.size
                 self._caption.draw(
-                    actor.caption, (float(at[0]), float(at[1])), self._targets.picture
+                    character.caption, (float(at[0]), float(at[1])), self._targets.picture
                 )
 
     def show(self, target: moderngl.Framebuffer) -> None:
-        """Copy the picture to a window's framebuffer of the same size."""
+        """Copy the picture to a framebuffer of the same size, such as a window's."""
         self._context.copy_framebuffer(target, self._targets.picture)
 
     def read(self) -> NDArray[np.uint8]:
-        """The picture (H, W, 4): sRGB with straight alpha, top row first."""
+        """Return the picture (H, W, 4): sRGB with straight alpha, top row first."""
         width, height = self.size
         data = self._targets.picture.read(components=4, alignment=1)
         pixels = np.frombuffer(data, dtype=np.uint8).reshape(height, width, 4)[::-1].copy()
@@ -264,15 +268,15 @@ class Stage:
         return pixels
 
     def release(self) -> None:
-        """Free everything on the GPU; the stage cannot be used after."""
-        for actor in list(self._actors):
-            self.remove(actor)
+        """Free all GL objects; the stage cannot be used afterwards."""
+        for character in list(self._characters):
+            self.remove(character)
         release_all(self._targets, self._maps, self._floor, self._tubes, self._inset)
         release_all(self._caption, self._backdrop_array, self._backdrop_program)
         release_all(self._lay_array, self._lay_program, self._fill_array, self._fill_program)
-        release_all(self._frame, self._mirrored)
+        release_all(self._frame, self._reflected_frame)
         programs = self._programs
-        release_all(programs.depth, programs.plain, programs.textured, programs.mirror)
+        release_all(programs.depth, programs.plain, programs.textured, programs.reflection)
 
 
 _EMPTY = np.array([[[-0.5, 0.0, -0.5], [0.5, 1.5, 0.5]]])

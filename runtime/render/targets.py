@@ -1,4 +1,4 @@
-"""The framebuffers that a picture of one size is drawn through."""
+"""The framebuffers of all render passes for a picture of one size."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ class Targets:
     """Framebuffers of one size.
 
     Attributes:
-        actors: multisampled colour and depth; cleared to nothing, premultiplied.
-        resolved: the same, one sample a pixel.
-        backdrop: the house without actors, kept while camera and pools stand still.
-        reflection: the actors upside down, half as wide and high.
-        picture: what is read or shown, premultiplied.
+        characters: the characters, multisampled colour and depth; cleared to transparent,
+            premultiplied.
+        resolved: the same with one sample a pixel.
+        backdrop: floor and curtain without characters; kept while camera and pools stay the same.
+        reflection: the characters upside down, at half the width and height.
+        picture: the finished picture, premultiplied.
     """
 
     def __init__(self, context: moderngl.Context, size: tuple[int, int], samples: int) -> None:
@@ -25,7 +26,7 @@ class Targets:
         self.resolved_image = context.texture(size, 4)
         self.reflection_image = context.texture(half, 4)
         self.reflection_image.repeat_x = self.reflection_image.repeat_y = False
-        self.actors = context.framebuffer(
+        self.characters = context.framebuffer(
             context.renderbuffer(size, 4, samples=samples),
             context.depth_renderbuffer(size, samples=samples),
         )
@@ -37,9 +38,15 @@ class Targets:
         self.picture = context.framebuffer(context.renderbuffer(size, 4))
 
     def release(self) -> None:
-        """Free the framebuffers and all that is attached to them."""
-        # moderngl goes back to the framebuffer in use after it makes another: let it be one that
+        """Free the framebuffers and their attachments."""
+        # moderngl binds the framebuffer in use again after it makes another one, so bind one that
         # outlives these.
         self._context.detect_framebuffer(0).use()
-        for target in (self.actors, self.resolved, self.backdrop, self.reflection, self.picture):
+        for target in (
+            self.characters,
+            self.resolved,
+            self.backdrop,
+            self.reflection,
+            self.picture,
+        ):
             release_all(target, *target.color_attachments, target.depth_attachment)

@@ -1,4 +1,4 @@
-"""Rods and beads: how skeletons and highlighted chains are drawn."""
+"""Draw skeletons and highlighted chains as rods and beads."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ PAIR_COLOURS = np.array(
         [0.620, 0.760, 0.050],  # young bamboo
     ]
 )
-"""(8, 3) linear RGB: the colours in which a source chain and what it drives are shown."""
+"""(8, 3) linear RGB: each pair of a source chain and the chain that it drives has a colour."""
 
 GLOW_REACH = 3.2  # radii
 
@@ -38,7 +38,10 @@ def tubes(
     opacity: ArrayLike = 1.0,
     glow: float = 0.0,
 ) -> Tubes:
-    """Capsules from `start` (K, 3) to `end` (K, 3); `radius` (K,), (K, 2) or one, in metres."""
+    """Pack capsules (K, 13) from `start` (K, 3) to `end` (K, 3).
+
+    `radius` [m] is one number, (K,), or (K, 2) for both ends.
+    """
     start = np.asarray(start, dtype=np.float32).reshape(-1, 3)
     packed = np.empty((len(start), 13), dtype=np.float32)
     packed[:, 0:3] = start
@@ -52,10 +55,10 @@ def tubes(
 
 
 def chain_tubes(chains: Sequence[ArrayLike], colours: ArrayLike, radius: float) -> Tubes:
-    """Glowing rods with beads along polylines, each (K, 3): first all glow, then rods, then beads.
+    """Return glows, rods and beads, in this order, along polylines, each (K, 3).
 
     Raises:
-        ValueError: not as many colours as chains.
+        ValueError: the number of colours is not the number of chains.
     """
     rgb = np.asarray(colours, dtype=np.float64).reshape(-1, 3)
     if len(rgb) != len(chains):
@@ -78,7 +81,7 @@ def chain_tubes(chains: Sequence[ArrayLike], colours: ArrayLike, radius: float) 
 
 
 class TubePainter:
-    """Draws capsules in one call, in the order given, over what is there."""
+    """Draws capsules over the picture in one call, in the order given."""
 
     def __init__(self, context: moderngl.Context) -> None:
         self._context = context
@@ -104,13 +107,13 @@ class TubePainter:
         """Draw capsules (K, 13) into the bound framebuffer, premultiplied.
 
         Args:
-            capsules: as `tubes` packs them.
+            capsules: the result of `tubes`.
             to_clip: (4, 4) world to clip space.
             size: of the viewport [px].
-            pixels: a metre's pixels at w = 1.
+            pixels: the pixels of a metre at w = 1.
             offset: added to the capsules' ends [m].
             origin: lower left corner of the viewport [px].
-            least: thinnest radius drawn [px].
+            least: the smallest radius that is drawn [px].
         """
         if not len(capsules):
             return

@@ -64,7 +64,7 @@ class Scene:
         self._puppets = puppets
         self._captions = len(puppets) > 1 and background is None
         places = _side_by_side([puppet.character for puppet in puppets])
-        self._actors = [
+        self._characters = [
             self.stage.add(
                 puppet.character,
                 position=(place, 0.0, 0.0),
@@ -93,7 +93,7 @@ class Scene:
             boxes[:, 0, ::2] -= room
             boxes[:, 1] += room
         else:
-            places = np.array([actor.position for actor in self._actors])[:, None]
+            places = np.array([character.position for character in self._characters])[:, None]
             moved = filled + places
             boxes = np.stack(
                 [np.minimum(boxes[:, 0], moved[:, 0]), np.maximum(boxes[:, 1], moved[:, 1])], axis=1
@@ -107,14 +107,14 @@ class Scene:
 
     def upload(self, motions: Sequence[Motion]) -> None:
         """Give the GPU the puppets as they are now."""
-        for actor, motion in zip(self._actors, motions, strict=True):
-            actor.update(motion.vertices)
+        for character, motion in zip(self._characters, motions, strict=True):
+            character.update(motion.vertices)
 
     def draw(self, pose: Pose | None) -> None:
         """Draw what was uploaded, the chains as they are now, and the performer in the mirror."""
-        for actor, puppet in zip(self._actors, self._puppets, strict=True):
+        for character, puppet in zip(self._characters, self._puppets, strict=True):
             chains = puppet.chains if self.highlights else []
-            actor.highlight(chains, _colours(len(chains)))
+            character.highlight(chains, _colours(len(chains)))
         if self._inset is not None and pose is not None:
             self._inset.update(
                 pose.seen,

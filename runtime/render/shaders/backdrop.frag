@@ -1,10 +1,10 @@
-// The house: a boarded stage with pools of light, and the three-striped curtain in the dark.
+// The backdrop: a floor of boards with pools of light, and a three-striped curtain in the dark.
 #include "frame.glsl"
 #include "colour.glsl"
 in vec2 place;
 layout(location = 0) out vec4 picture_colour;
 
-// In whole numbers, so that every driver makes the same boards.
+// Integer arithmetic: every driver makes the same boards.
 float noise(vec2 cell) {
     uvec2 q = uvec2(ivec2(floor(cell))) * uvec2(1597334673u, 3812015801u);
     uint mixed = (q.x ^ q.y) * 1597334673u;

@@ -1,4 +1,4 @@
-// Depth only, for the shadow map and for the height map below the actors.
+// Depth only, for the shadow map and for the height map below the characters.
 uniform mat4 to_clip;
 uniform vec3 offset;
 in vec3 in_position;

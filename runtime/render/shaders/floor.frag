@@ -1,4 +1,4 @@
-// Darkens the backdrop's floor by shadow and contact, and adds the reflection of the actors.
+// Darkens the backdrop's floor by shadow and contact, and adds the characters' reflections.
 #include "frame.glsl"
 #include "colour.glsl"
 uniform sampler2D floor_mask;

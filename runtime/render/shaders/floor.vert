@@ -1,4 +1,4 @@
-// The part of the floor that shadows and reflections can reach, as two triangles.
+// The area of the floor with shadows and reflections, as two triangles.
 #include "frame.glsl"
 uniform float reach;
 out vec2 place;

@@ -1,4 +1,4 @@
-// How much key light (r) and open sky (g) each point of the floor gets.
+// The key light (r) and ambient light (g) that each point of the floor receives.
 #include "frame.glsl"
 uniform sampler2DShadow shadow_map;
 uniform sampler2D height_map;

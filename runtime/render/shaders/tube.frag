@@ -1,6 +1,6 @@
 // A lacquered rod or bead with a dark outline, or the glow around it; edges are analytic.
 #include "colour.glsl"
-uniform vec2 origin;          // of the part of the target that is drawn into [px]
+uniform vec2 origin;          // lower left corner of the viewport [px]
 flat in vec4 ends;
 flat in vec2 radii;
 flat in vec4 colour;

@@ -1,7 +1,7 @@
 // A bone or a joint as a flat capsule that always faces the viewer.
 uniform mat4 to_clip;
 uniform vec2 size;            // of the picture [px]
-uniform float pixels;         // a metre's pixels at w = 1
+uniform float pixels;         // pixels of a metre at w = 1
 uniform float least;          // thinnest radius [px]
 uniform vec3 offset;
 in vec4 in_from;              // xyz, radius [m]

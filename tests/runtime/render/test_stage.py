@@ -124,7 +124,7 @@ def assert_golden(name: str, picture: np.ndarray, context: moderngl.Context) -> 
     assert (difference.max(axis=2) > 12).mean() < 0.01
 
 
-def test_golden_house_with_two_actors_chain_caption_and_inset(
+def test_golden_house_with_two_characters_chain_caption_and_inset(
     stage: Stage, context: moderngl.Context
 ) -> None:
     torus = trimesh.creation.torus(0.45, 0.18)
@@ -132,8 +132,8 @@ def test_golden_house_with_two_actors_chain_caption_and_inset(
         np.add(np.asarray(torus.vertices), (0, 0.63, 0)), torus.faces, (0.05, 0.4, 0.1, 1.0)
     )
     stage.add(ball(BLUE), position=(-0.9, 0, 0), caption="ball")
-    actor = stage.add(ring, position=(0.9, 0, 0), caption="ring")
-    actor.highlight([[[-0.4, 0.6, 0], [0, 0.9, 0.1], [0.4, 0.6, 0]]], PAIR_COLOURS[:1])
+    character = stage.add(ring, position=(0.9, 0, 0), caption="ring")
+    character.highlight([[[-0.4, 0.6, 0], [0, 0.9, 0.1], [0.4, 0.6, 0]]], PAIR_COLOURS[:1])
     stage.draw(front_camera().frame(stage.boxes, stage.aspect), performer())
     assert_golden("house", stage.read(), context)
 
@@ -162,10 +162,10 @@ def test_the_same_scene_is_the_same_picture_to_the_last_bit(context: moderngl.Co
 
 def test_moved_vertices_change_the_picture_and_moving_back_restores_it(stage: Stage) -> None:
     shape = ball()
-    actor = stage.add(shape)
+    character = stage.add(shape)
     pictures = []
     for shift in (0.0, 0.3, 0.0):
-        actor.update(np.add(shape.vertices, (shift, 0, 0)))
+        character.update(np.add(shape.vertices, (shift, 0, 0)))
         stage.draw(CAMERA)
         pictures.append(stage.read())
     assert (pictures[0] != pictures[1]).any(axis=2).mean() > 0.02
@@ -177,7 +177,7 @@ def test_vertices_of_another_mesh_are_refused(stage: Stage) -> None:
         stage.add(ball()).update(np.zeros((4, 3)))
 
 
-def test_without_a_house_only_the_actor_is_opaque(bare: Stage) -> None:
+def test_without_a_house_only_the_character_is_opaque(bare: Stage) -> None:
     bare.add(ball())
     bare.draw(CAMERA)
     picture = bare.read()
@@ -205,13 +205,13 @@ def test_a_plain_background_is_that_colour_exactly_and_nothing_falls_on_it(
     assert (picture[..., 3] == 255).all()
     empty, full = alone[..., 3] == 0, alone[..., 3] == 255
     assert (picture[empty][:, :3] == colour).all(), "no shadow, no reflection, no noise"
-    np.testing.assert_array_equal(picture[full], alone[full], "and the actor as without it")
+    np.testing.assert_array_equal(picture[full], alone[full], "and the character as without it")
 
 
 def test_laid_over_anything_the_transparent_picture_is_the_one_drawn_there(
     context: moderngl.Context, bare: Stage
 ) -> None:
-    """No halo: edges are as if the actor had been drawn on the colour in the first place."""
+    """No halo: edges are as if the character had been drawn on the colour in the first place."""
     bare.add(ball())
     bare.draw(CAMERA)
     straight = bare.read().astype(float)
@@ -231,7 +231,7 @@ def test_the_stage_goes_dark_down_to_black_or_to_the_background_alone(
     context: moderngl.Context, background: Background | None
 ) -> None:
     stage = Stage(context, SIZE, background=background)
-    actor = stage.add(ball(), caption="ball")
+    character = stage.add(ball(), caption="ball")
     pictures = []
     for stage.brightness in (1.0, 0.5, 0.0, 1.0):
         stage.draw(CAMERA, performer())
@@ -243,7 +243,7 @@ def test_the_stage_goes_dark_down_to_black_or_to_the_background_alone(
         assert (dark[..., 3] == 255).all()
         assert np.abs(half[..., :3] - light[..., :3] / 2.0).max() <= 1.0
     else:
-        stage.remove(actor)
+        stage.remove(character)
         stage.draw(CAMERA)
         np.testing.assert_array_equal(dark, stage.read())
         assert abs(half[90, 160, 3] - (128 if background is NOTHING else 255)) <= 1
@@ -272,10 +272,10 @@ def test_a_shadow_falls_on_the_floor_away_from_the_key_light(stage: Stage) -> No
 
 def test_what_is_below_the_floor_is_hidden_by_it(stage: Stage, bare: Stage) -> None:
     for where in (stage, bare):
-        actor = where.add(character_of(*_box((-0.3, -1.0, -0.3), (0.3, -0.2, 0.3))))
+        character = where.add(character_of(*_box((-0.3, -1.0, -0.3), (0.3, -0.2, 0.3))))
         pictures = []
         for depth in (0.0, 50.0):
-            actor.position = np.array([0.0, -depth, 0.0])
+            character.position = np.array([0.0, -depth, 0.0])
             where.draw(CAMERA)
             pictures.append(where.read())
         hidden = np.array_equal(pictures[0], pictures[1])
@@ -336,22 +336,22 @@ def test_see_through_material_lets_the_background_through(bare: Stage) -> None:
 
 
 def test_highlighted_chains_show_through_the_surface_and_can_be_put_out(bare: Stage) -> None:
-    actor = bare.add(ball())
+    character = bare.add(ball())
     bare.draw(CAMERA)
     plain = bare.read()
-    actor.highlight([[[0, 0.5, 0], [0, 0.9, 0]]], [PAIR_COLOURS[1]])  # in the ball's middle
+    character.highlight([[[0, 0.5, 0], [0, 0.9, 0]]], [PAIR_COLOURS[1]])  # in the ball's middle
     bare.draw(CAMERA)
     lit = bare.read().astype(int)
     changed = (lit != plain).any(axis=2)
     assert 20 < changed.sum() < 4000
     brightest = lit[changed][:, 2].max()
     assert brightest > 180  # sky blue over a red ball
-    actor.highlight([], [])
+    character.highlight([], [])
     bare.draw(CAMERA)
     np.testing.assert_array_equal(bare.read(), plain)
 
 
-def test_resize_keeps_the_actors(stage: Stage) -> None:
+def test_resize_keeps_the_characters(stage: Stage) -> None:
     stage.add(ball())
     stage.resize((200, 100))
     stage.draw(CAMERA)
@@ -360,9 +360,9 @@ def test_resize_keeps_the_actors(stage: Stage) -> None:
     assert picture[50, 100, 0] > picture[50, 100, 2] + 40
 
 
-def test_a_removed_actor_is_gone(bare: Stage) -> None:
-    actor = bare.add(ball())
-    bare.remove(actor)
+def test_a_removed_character_is_gone(bare: Stage) -> None:
+    character = bare.add(ball())
+    bare.remove(character)
     bare.draw(CAMERA)
     assert not bare.read().any()
 
@@ -373,7 +373,7 @@ def test_a_picture_too_large_or_empty_is_refused(context: moderngl.Context) -> N
             Stage(context, size)
 
 
-def test_more_actors_than_pools_are_refused(stage: Stage) -> None:
+def test_more_characters_than_pools_are_refused(stage: Stage) -> None:
     tiny = character_of(*_box((0, 0, 0), (0.1, 0.1, 0.1)))
     for _ in range(16):
         stage.add(tiny)

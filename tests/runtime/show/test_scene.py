@@ -99,7 +99,7 @@ def test_the_camera_sees_all_that_is_filled_in_the_show(
     scene = theatres[0]
     filled = np.array([[[-1.0, 0.0, -0.5], [1.0, 4.0, 0.5]], [[-3.0, 0.0, -2.0], [2.0, 1.0, 2.5]]])
     scene.frame_all(filled)
-    places = np.array([actor.position for actor in scene._actors])
+    places = np.array([character.position for character in scene._characters])
     shares = reach(scene.camera, filled + places[:, None], scene.stage.aspect)
     assert shares.max() <= 0.8 + 1e-6, "inside the margins"
     assert shares.max() > 0.7, "which it fills"
@@ -161,12 +161,12 @@ def test_what_is_uploaded_needs_no_chains_and_is_drawn_with_them(
     one = puppets[:1]
     motions = rested(one)
     theatres.append(Scene(context, SIZE, one, BODY))
-    actor = theatres[0]._actors[0]
+    character = theatres[0]._characters[0]
     theatres[0].upload(motions)
-    assert len(actor.tubes) == 0, "what the vertices do not need is left for the drawing"
+    assert len(character.tubes) == 0, "what the vertices do not need is left for the drawing"
     theatres[0].draw(None)
     rods = sum(len(chain) - 1 for chain in one[0].chains)
-    assert len(actor.tubes) == 2 * rods + sum(len(chain) for chain in one[0].chains)
+    assert len(character.tubes) == 2 * rods + sum(len(chain) for chain in one[0].chains)
 
 
 def test_the_mirror_shows_the_performer(

@@ -1,4 +1,4 @@
-"""One character on the stage: its buffers, what it is made of, and the chains that light up."""
+"""One character on the stage: its vertex buffers, its materials, and its highlighted chains."""
 
 from __future__ import annotations
 
@@ -28,39 +28,39 @@ SAMPLE_ALPHA_TO_ONE = 0x809F
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class ActorPrograms:
-    """The programs that actors are drawn with, shared by all on a stage."""
+class CharacterPrograms:
+    """The shader programs that draw characters; all characters on a stage share them."""
 
     depth: moderngl.Program
     plain: moderngl.Program
     textured: moderngl.Program
-    mirror: moderngl.Program
+    reflection: moderngl.Program
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Part:
-    """A run of triangles of one material."""
+class _MaterialRun:
+    """Consecutive triangles of one material."""
 
     first: int
     count: int
     tint: tuple[float, ...]
-    mirror_tint: tuple[float, ...]
+    reflection_tint: tuple[float, ...]
     image: moderngl.Texture | None
     see_through: bool
 
 
-class Actor:
-    """A character that stands on a stage; made by `Stage.add`.
+class StageCharacter:
+    """A character as a stage draws it; `Stage.add` makes one.
 
     Attributes:
-        caption: what is written at its feet, or nothing.
-        position: (3,) [m] where its origin stands on the stage.
+        caption: the text at its feet; empty for none.
+        position: (3,) [m] the place of its origin on the stage.
     """
 
     def __init__(
         self,
         context: moderngl.Context,
-        programs: ActorPrograms,
+        programs: CharacterPrograms,
         character: Character,
         position: ArrayLike,
         caption: str,
@@ -74,7 +74,7 @@ class Actor:
         self._closed = is_closed(character.vertices, self._split.faces)
         self._normals = DeformingNormals(self._split)
         self._moving = context.buffer(reserve=24 * len(self._split.welded), dynamic=True)
-        self._parts, self._order = _parts(context, character)
+        self._runs, self._order = _material_runs(context, character)
         self._constant = context.buffer(_constant_attributes(character, self._split))
         triangles = self._split.triangles[self._order]
         self._indices = context.buffer(triangles.tobytes() or bytes(12))
@@ -92,7 +92,7 @@ class Actor:
         buffers = {
             "depth": [position],
             "plain": [whole, colour],
-            "mirror": [whole, colour],
+            "reflection": [whole, colour],
             "textured": [whole, image],
         }
         return {
@@ -101,7 +101,7 @@ class Actor:
         }
 
     def update(self, vertices: NDArray[np.float64]) -> None:
-        """Take the deformed welded vertices (N, 3) [m], in the character's stage coordinates.
+        """Upload the deformed welded vertices (N, 3) [m], in the character's coordinates.
 
         Raises:
             ValueError: the shape is not that of the character's vertices.
@@ -111,19 +111,19 @@ class Actor:
                 f"Expected `vertices` to have shape {self._rest_shape}, got {vertices.shape}"
             )
         vertices = np.ascontiguousarray(vertices, dtype=np.float64)
-        self._moving.orphan()  # new room: a write must not wait for what still draws from the old
+        self._moving.orphan()  # new storage: the write does not wait for draws from the old one
         self._moving.write(self._normals.fill(vertices))
         self._box = bounding_box(vertices)
 
     def highlight(self, chains: Sequence[ArrayLike], colours: ArrayLike) -> None:
-        """Light up polylines inside the surface; visible through it. No chains: none.
+        """Highlight polylines inside the surface; they show through it. An empty list removes them.
 
         Args:
-            chains: each (K, 3) [m], in the character's stage coordinates.
+            chains: each (K, 3) [m], in the character's coordinates.
             colours: (C, 3) linear RGB of each chain.
 
         Raises:
-            ValueError: not as many colours as chains.
+            ValueError: the number of colours is not the number of chains.
         """
         self._tubes = chain_tubes(chains, colours, self._tube_radius)
 
@@ -134,59 +134,59 @@ class Actor:
 
     @property
     def box(self) -> NDArray[np.float64]:
-        """(2, 3) [m] least and greatest corner of what it fills now, on the stage."""
+        """(2, 3) [m] least and greatest corner of its current vertices on the stage."""
         return self._box + self.position
 
     @property
     def pool(self) -> NDArray[np.float64]:
-        """(3,) x, z and radius [m] of the pool of light that it stands in."""
+        """(3,) x, z and radius [m] of its pool of light on the floor."""
         low, high = self.rest_box + self.position
         half = (high - low)[[0, 2]] / 2.0
         centre = (low + high)[[0, 2]] / 2.0
         return np.array([*centre, max(0.62, float(half.max()) + 0.38)])
 
     def draw_depth(self, to_clip: NDArray[np.float64]) -> None:
-        """Draw into a depth map whose clip space `to_clip` (4, 4) leads to."""
+        """Draw into a depth map; `to_clip` (4, 4) maps world coordinates to its clip space."""
         self._programs.depth["to_clip"] = tuple(to_clip.T.ravel())
         self._programs.depth["offset"] = tuple(self.position)
         with _culling(self._context, self._closed):
             self._arrays["depth"].render()
 
-    def draw_mirrored(self) -> None:
-        """Draw what the floor reflects."""
-        program = self._programs.mirror
+    def draw_reflection(self) -> None:
+        """Draw the upside-down image that the floor reflects."""
+        program = self._programs.reflection
         program["offset"] = tuple(self.position)
-        self._context.front_face = "cw"  # a mirror turns every triangle round
-        for part in self._parts:
-            program["tint"] = part.mirror_tint
-            with _culling(self._context, self._closed and not part.see_through):
-                self._arrays["mirror"].render(vertices=part.count, first=part.first)
+        self._context.front_face = "cw"  # a reflection reverses the winding of every triangle
+        for run in self._runs:
+            program["tint"] = run.reflection_tint
+            with _culling(self._context, self._closed and not run.see_through):
+                self._arrays["reflection"].render(vertices=run.count, first=run.first)
         self._context.front_face = "ccw"
 
     def draw(self) -> None:
         """Draw the lit surface."""
-        for part in self._parts:
-            name = "plain" if part.image is None else "textured"
+        for run in self._runs:
+            name = "plain" if run.image is None else "textured"
             program = getattr(self._programs, name)
             program["offset"] = tuple(self.position)
-            program["tint"] = part.tint
-            if part.image is not None:
-                part.image.use(1)
+            program["tint"] = run.tint
+            if run.image is not None:
+                run.image.use(1)
             with (
-                _coverage(self._context, part.see_through),
-                _culling(self._context, self._closed and not part.see_through),
+                _coverage(self._context, run.see_through),
+                _culling(self._context, self._closed and not run.see_through),
             ):
-                self._arrays[name].render(vertices=part.count, first=part.first)
+                self._arrays[name].render(vertices=run.count, first=run.first)
 
     def release(self) -> None:
         """Free its GL objects."""
         release_all(*self._arrays.values(), self._moving, self._constant, self._indices)
-        release_all(*(part.image for part in self._parts))
+        release_all(*(run.image for run in self._runs))
 
 
 @contextmanager
 def _culling(context: moderngl.Context, wanted: bool) -> Iterator[None]:
-    """Leave out triangles that face away: half the work where no inside can be seen."""
+    """Skip triangles that face away: half the work where no inside can be seen."""
     if wanted:
         context.enable(moderngl.CULL_FACE)
     yield
@@ -196,7 +196,7 @@ def _culling(context: moderngl.Context, wanted: bool) -> Iterator[None]:
 
 @contextmanager
 def _coverage(context: moderngl.Context, wanted: bool) -> Iterator[None]:
-    """Turn alpha into covered samples: see-through surfaces without sorting."""
+    """Turn alpha into sample coverage: translucent surfaces need no sorting."""
     states = (SAMPLE_ALPHA_TO_COVERAGE, SAMPLE_ALPHA_TO_ONE) if wanted else ()
     for state in states:
         context.enable_direct(state)
@@ -214,17 +214,17 @@ def _constant_attributes(character: Character, split: DrawVertices) -> bytes:
     return attributes.tobytes()
 
 
-def _parts(
+def _material_runs(
     context: moderngl.Context, character: Character
-) -> tuple[list[_Part], NDArray[np.int64]]:
-    """Runs of triangles, one for each material in use, and the face order that makes them runs."""
+) -> tuple[list[_MaterialRun], NDArray[np.int64]]:
+    """One run of triangles for each used material, and the face order (F,) that groups them."""
     surface = character.surface
     order = np.argsort(surface.face_material, kind="stable")
     used, first, count = np.unique(
         surface.face_material[order], return_index=True, return_counts=True
     )
     faint = bool((surface.colors[:, 3] < 0.999).any())
-    parts = []
+    runs = []
     for index, start, faces in zip(used, first, count, strict=True):
         material = surface.materials[index]
         texture = material.texture if surface.uvs is not None else None
@@ -233,17 +233,17 @@ def _parts(
         if texture is not None:
             mean = _linear(np.asarray(texture)[::4, ::4].reshape(-1, 4)).mean(axis=0)
             see_through |= bool((texture[..., 3] < 255).any())
-        parts.append(
-            _Part(
+        runs.append(
+            _MaterialRun(
                 first=int(start) * 3,
                 count=int(faces) * 3,
                 tint=tuple(material.color.tolist()),
-                mirror_tint=tuple((material.color * mean).tolist()),
+                reflection_tint=tuple((material.color * mean).tolist()),
                 image=None if texture is None else _image(context, material),
                 see_through=bool(see_through),
             )
         )
-    return parts, order
+    return runs, order
 
 
 def _linear(colours: NDArray[np.uint8]) -> NDArray[np.float64]:

@@ -1,4 +1,4 @@
-// The round mirror in which the performer is shown: dark glass in a brass ring.
+// The inset's disc: dark glass in a brass ring.
 uniform vec3 disc;            // centre and radius [px]
 layout(location = 0) out vec4 premultiplied;
 void main() {

@@ -1,4 +1,4 @@
-// What the polished floor gives back: plain shading that fades with height.
+// The reflection in the polished floor: plain shading that fades with height.
 #include "frame.glsl"
 #include "colour.glsl"
 uniform vec4 tint;
