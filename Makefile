@@ -10,7 +10,7 @@ demo: $(READY)
 	$(BIN)/bunraku demo --video demo.mp4 --report demo.json
 
 test: $(READY)
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --dist worksteal
 
 check: $(READY)
 	$(BIN)/ruff check .

@@ -1,4 +1,4 @@
-"""Shared fixtures: where the real recordings and meshes lie, a GL context, a seed, Ctrl-C."""
+"""Fixtures of all tests: real recordings, a GL context, a seed, Ctrl-C; options and profiles."""
 
 from __future__ import annotations
 
@@ -9,11 +9,23 @@ from pathlib import Path
 import moderngl
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, settings
 
 from devices.errors import InputError
 from runtime.render.context import headless_context, release_headless
 
+# Nothing may depend on the clock: how long an example takes is no fault.
+settings.register_profile("bunraku", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("bunraku")
+
 SHARED = Path(__file__).resolve().parents[1].parent / "shared" / "data"
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """Add the options of our own tests."""
+    parser.addoption(
+        "--regenerate-golden", action="store_true", help="draw the golden pictures anew"
+    )
 
 
 @pytest.fixture(scope="session")

@@ -1,3 +1,7 @@
+"""The camera: framing boxes, orbiting, panning and zooming."""
+
+from __future__ import annotations
+
 import math
 
 import numpy as np

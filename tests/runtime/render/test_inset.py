@@ -1,3 +1,7 @@
+"""The inset: the performer stays inside it, and drives and fills are told apart."""
+
+from __future__ import annotations
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
@@ -9,7 +13,7 @@ REST = np.array([[0, 1, 0], [0, 1.5, 0], [0.5, 1.5, 0], [-0.5, 1.5, 0]], dtype=f
 
 
 def ends(inset: SkeletonInset) -> np.ndarray:
-    """Where capsules end in the mirror's frame (2 K, 2)."""
+    """Where capsules end in the inset's coordinates (2 K, 2)."""
     return np.vstack([inset.capsules[:, 0:2], inset.capsules[:, 4:6]])
 
 

@@ -1,10 +1,13 @@
+"""Normals of deforming surfaces: smooth over seams, sharp at creases, never NaN."""
+
+from __future__ import annotations
+
 import math
 
 import numpy as np
 import trimesh
 
-from devices.skeleton import Skeleton
-from runtime.characters.character import Character, Material, Surface
+from runtime.characters.character import Character, Surface
 from runtime.render.smoothing import (
     CREASE,
     DeformingNormals,
@@ -12,28 +15,7 @@ from runtime.render.smoothing import (
     is_closed,
     split_vertices,
 )
-
-
-def character_of(mesh: trimesh.Trimesh) -> Character:
-    count = len(mesh.vertices)
-    surface = Surface(
-        vertex=np.arange(count),
-        faces=np.asarray(mesh.faces, dtype=np.int32),
-        colors=np.ones((count, 4), dtype=np.float32),
-        uvs=None,
-        materials=(Material(np.ones(4, dtype=np.float32)),),
-        face_material=np.zeros(len(mesh.faces), dtype=np.int64),
-    )
-    bone = Skeleton(("root",), np.array([-1]), np.zeros((1, 3)))
-    return Character(
-        name="shape",
-        vertices=np.asarray(mesh.vertices, dtype=np.float64),
-        faces=np.asarray(mesh.faces, dtype=np.int64),
-        skeleton=bone,
-        weights=None,
-        surface=surface,
-        placement=np.eye(4),
-    )
+from tests.runtime.render.shapes import shape_of
 
 
 def drawn(character: Character, crease: float = CREASE) -> tuple[np.ndarray, np.ndarray]:
@@ -44,28 +26,28 @@ def drawn(character: Character, crease: float = CREASE) -> tuple[np.ndarray, np.
 
 
 def test_a_sphere_is_smooth_and_its_normals_point_outward() -> None:
-    sphere = character_of(trimesh.creation.icosphere(subdivisions=3))
+    sphere = shape_of(trimesh.creation.icosphere(subdivisions=3))
     positions, normals = drawn(sphere)
     assert len(positions) == len(sphere.vertices)
     assert (positions * normals).sum(axis=1).min() > 0.9995
 
 
 def test_a_box_is_sharp_and_each_corner_is_drawn_for_three_sides() -> None:
-    _, normals = drawn(character_of(trimesh.creation.box()))
+    _, normals = drawn(shape_of(trimesh.creation.box()))
     assert len(normals) == 24
     np.testing.assert_allclose(np.abs(normals).max(axis=1), 1.0, atol=1e-6)
 
 
 def test_normals_do_not_depend_on_which_diagonal_cuts_a_side() -> None:
     # Three right angles meet at a box's corner, cut by one to two triangles a side.
-    positions, normals = drawn(character_of(trimesh.creation.box()), crease=math.pi)
+    positions, normals = drawn(shape_of(trimesh.creation.box()), crease=math.pi)
     assert len(positions) == 8
     np.testing.assert_allclose(normals, positions * 2.0 / math.sqrt(3.0), atol=1e-6)
 
 
 def test_a_seam_of_the_file_does_not_show_in_the_normals() -> None:
     sphere = trimesh.creation.icosphere(subdivisions=2)
-    whole = character_of(sphere)
+    whole = shape_of(sphere)
     surface = whole.surface
     torn = Surface(  # every face has vertices of its own in the file
         vertex=surface.faces.reshape(-1).astype(np.int64),
@@ -84,14 +66,14 @@ def test_a_seam_of_the_file_does_not_show_in_the_normals() -> None:
 def test_faces_that_disagree_about_outside_do_not_cancel() -> None:
     vertices = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
     faces = np.array([[0, 1, 2], [0, 3, 2]])  # the second runs the other way round
-    _, normals = drawn(character_of(trimesh.Trimesh(vertices, faces, process=False)))
+    _, normals = drawn(shape_of(trimesh.Trimesh(vertices, faces, process=False)))
     np.testing.assert_allclose(np.linalg.norm(normals, axis=1), 1.0, atol=1e-6)
 
 
 def test_a_face_without_area_gives_no_nan() -> None:
     vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 0, 0]], dtype=float)
     faces = np.array([[0, 1, 2], [0, 3, 1], [1, 1, 3]])
-    _, normals = drawn(character_of(trimesh.Trimesh(vertices, faces, process=False)))
+    _, normals = drawn(shape_of(trimesh.Trimesh(vertices, faces, process=False)))
     assert np.isfinite(normals).all()
 
 
@@ -113,7 +95,7 @@ def angle_weighted(vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
 def test_every_normal_is_what_the_definition_says_on_slivers_and_folds_too() -> None:
     sphere = trimesh.creation.icosphere(subdivisions=3)  # 1280 faces: many blocks, and a part
     faces = np.asarray(sphere.faces)[:-1]
-    whole = character_of(trimesh.Trimesh(sphere.vertices, faces, process=False))
+    whole = shape_of(trimesh.Trimesh(sphere.vertices, faces, process=False))
     normals = DeformingNormals(split_vertices(whole, crease=math.pi))
     round_, chance = np.asarray(sphere.vertices), np.random.default_rng(5)
     rough = round_ + chance.normal(scale=0.08, size=round_.shape)  # edges are 0.14 long: it folds
@@ -128,14 +110,14 @@ def test_every_normal_is_what_the_definition_says_on_slivers_and_folds_too() -> 
 
 
 def test_where_all_faces_are_without_area_the_normal_is_zero() -> None:
-    sphere = character_of(trimesh.creation.icosphere(subdivisions=1))
+    sphere = shape_of(trimesh.creation.icosphere(subdivisions=1))
     normals = DeformingNormals(split_vertices(sphere))
     normals.fill(sphere.vertices)
     assert not normals.fill(np.ones_like(sphere.vertices))[:, 3:].any()
 
 
 def test_two_runs_agree_to_the_last_bit() -> None:
-    torus = character_of(trimesh.creation.torus(1.0, 0.3))
+    torus = shape_of(trimesh.creation.torus(1.0, 0.3))
     assert drawn(torus)[1].tobytes() == drawn(torus)[1].tobytes()
 
 

@@ -1,40 +1,21 @@
-"""The stage drawn without a window. Golden pictures: BUNRAKU_REGENERATE_GOLDEN=1 writes them anew.
-
-They are compared on a software driver only. Another version of it may place an edge's samples a
-little differently: the mean may differ by 1 of 255, and one pixel in a hundred by more than 12.
-"""
+"""The stage drawn without a window: what is opaque, what is lit, what changes and what does not."""
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import moderngl
 import numpy as np
 import pytest
-import trimesh
-from PIL import Image
 
 from devices.errors import InputError
-from devices.skeleton import Skeleton
-from runtime.characters.character import Character, Material, Surface
+from runtime.characters.character import Material
 from runtime.render.background import NOTHING, Background
-from runtime.render.camera import front_camera
-from runtime.render.context import (
-    headless_context,
-    is_software,
-    renderer_name,
-)
-from runtime.render.inset import SkeletonInset
+from runtime.render.context import headless_context
 from runtime.render.stage import Stage
 from runtime.render.tubes import PAIR_COLOURS
-
-GOLDEN = Path(__file__).resolve().parents[2] / "data" / "golden"
-SIZE = (320, 180)
-CAMERA = front_camera().frame([[-0.6, 0.0, -0.4], [0.6, 1.6, 0.4]], 16 / 9)
-RED, BLUE = (0.6, 0.05, 0.03, 1.0), (0.04, 0.16, 0.55, 1.0)
+from tests.runtime.render.shapes import CAMERA, SIZE, WHITE, ball, box, performer, sheet
 
 
 @pytest.fixture(autouse=True)
@@ -56,96 +37,6 @@ def bare(context: moderngl.Context) -> Iterator[Stage]:
     stage = Stage(context, SIZE, background=NOTHING)
     yield stage
     stage.release()
-
-
-def character_of(
-    vertices: np.ndarray,
-    faces: np.ndarray,
-    colour: tuple[float, ...] = RED,
-    *,
-    uvs: np.ndarray | None = None,
-    material: Material | None = None,
-) -> Character:
-    count = len(vertices)
-    surface = Surface(
-        vertex=np.arange(count),
-        faces=np.asarray(faces, dtype=np.int32),
-        colors=np.tile(np.array(colour, dtype=np.float32), (count, 1)),
-        uvs=None if uvs is None else np.asarray(uvs, dtype=np.float32),
-        materials=(material or Material(np.ones(4, dtype=np.float32)),),
-        face_material=np.zeros(len(faces), dtype=np.int64),
-    )
-    return Character(
-        name="shape",
-        vertices=np.asarray(vertices, dtype=np.float64),
-        faces=np.asarray(faces, dtype=np.int64),
-        skeleton=Skeleton(("root",), np.array([-1]), np.zeros((1, 3))),
-        weights=None,
-        surface=surface,
-        placement=np.eye(4),
-    )
-
-
-def ball(colour: tuple[float, ...] = RED, height: float = 1.4) -> Character:
-    sphere = trimesh.creation.icosphere(subdivisions=3, radius=height / 2.0)
-    return character_of(np.add(sphere.vertices, (0, height / 2.0, 0)), sphere.faces, colour)
-
-
-def sheet(**more: object) -> Character:
-    corners = np.array([[-0.5, 0.3, 0], [0.5, 0.3, 0], [0.5, 1.3, 0], [-0.5, 1.3, 0]])
-    uvs = np.array([[0, 1], [1, 1], [1, 0], [0, 0]])
-    return character_of(corners, np.array([[0, 1, 2], [0, 2, 3]]), uvs=uvs, **more)
-
-
-def performer() -> SkeletonInset:
-    joints = np.array(
-        [[0, 0.9, 0], [0, 1.4, 0], [0, 1.65, 0], [0.5, 1.6, 0.1], [-0.5, 1.1, 0], [0.15, 0, 0]]
-    )
-    colours = np.full((6, 3), np.nan)
-    colours[3], colours[4] = PAIR_COLOURS[:2]
-    inset = SkeletonInset([-1, 0, 1, 1, 1, 0])
-    inset.update(joints, colours=colours, dimmed=np.arange(6) == 5)
-    return inset
-
-
-def assert_golden(name: str, picture: np.ndarray, context: moderngl.Context) -> None:
-    path = GOLDEN / f"{name}.png"
-    if os.environ.get("BUNRAKU_REGENERATE_GOLDEN"):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        Image.fromarray(picture).save(path, optimize=True)
-    if not is_software(context):
-        pytest.skip(
-            f"golden pictures are compared on a software driver, not {renderer_name(context)}"
-        )
-    with Image.open(path) as image:
-        expected = np.asarray(image.convert("RGBA"), dtype=np.int16)
-    difference = np.abs(picture.astype(np.int16) - expected)
-    assert difference.mean() < 1.0
-    assert (difference.max(axis=2) > 12).mean() < 0.01
-
-
-def test_golden_house_with_two_characters_chain_caption_and_inset(
-    stage: Stage, context: moderngl.Context
-) -> None:
-    torus = trimesh.creation.torus(0.45, 0.18)
-    ring = character_of(
-        np.add(np.asarray(torus.vertices), (0, 0.63, 0)), torus.faces, (0.05, 0.4, 0.1, 1.0)
-    )
-    stage.add(ball(BLUE), position=(-0.9, 0, 0), caption="ball")
-    character = stage.add(ring, position=(0.9, 0, 0), caption="ring")
-    character.highlight([[[-0.4, 0.6, 0], [0, 0.9, 0.1], [0.4, 0.6, 0]]], PAIR_COLOURS[:1])
-    stage.draw(front_camera().frame(stage.boxes, stage.aspect), performer())
-    assert_golden("house", stage.read(), context)
-
-
-def test_golden_transparent_textured_sheet(bare: Stage, context: moderngl.Context) -> None:
-    checks = np.zeros((8, 8, 4), dtype=np.uint8)
-    checks[..., 3] = 255
-    checks[(np.indices((8, 8)).sum(axis=0) % 2) == 0, :3] = 230, 190, 60
-    material = Material(np.ones(4, dtype=np.float32), checks)
-    bare.add(sheet(colour=(1.0, 1.0, 1.0, 1.0), material=material))
-    bare.draw(CAMERA.orbit(0.5, 0.2))
-    assert_golden("sheet", bare.read(), context)
 
 
 def test_the_same_scene_is_the_same_picture_to_the_last_bit(context: moderngl.Context) -> None:
@@ -272,7 +163,7 @@ def test_a_shadow_falls_on_the_floor_away_from_the_key_light(stage: Stage) -> No
 
 def test_what_is_below_the_floor_is_hidden_by_it(stage: Stage, bare: Stage) -> None:
     for where in (stage, bare):
-        character = where.add(character_of(*_box((-0.3, -1.0, -0.3), (0.3, -0.2, 0.3))))
+        character = where.add(box((-0.3, -1.0, -0.3), (0.3, -0.2, 0.3)))
         pictures = []
         for depth in (0.0, 50.0):
             character.position = np.array([0.0, -depth, 0.0])
@@ -280,11 +171,6 @@ def test_what_is_below_the_floor_is_hidden_by_it(stage: Stage, bare: Stage) -> N
             pictures.append(where.read())
         hidden = np.array_equal(pictures[0], pictures[1])
         assert hidden is (where is stage)  # without a floor there is nothing to hide it
-
-
-def _box(low: tuple[float, ...], high: tuple[float, ...]) -> tuple[np.ndarray, np.ndarray]:
-    box = trimesh.creation.box(bounds=[low, high])
-    return np.asarray(box.vertices), np.asarray(box.faces)
 
 
 def test_both_sides_of_a_sheet_are_lit_alike(context: moderngl.Context) -> None:
@@ -320,7 +206,7 @@ def test_textures_have_their_first_row_at_v_zero(bare: Stage) -> None:
     image[:8, :, 0] = 255  # the first row is red and lies at v = 0: the sheet's top
     image[8:, :, 2] = 255
     material = Material(np.ones(4, dtype=np.float32), image)
-    bare.add(sheet(colour=(1.0, 1.0, 1.0, 1.0), material=material))
+    bare.add(sheet(WHITE, material))
     bare.draw(CAMERA)
     picture = bare.read().astype(int)
     inked = np.flatnonzero(picture[:, 160, 3] == 255)
@@ -374,7 +260,7 @@ def test_a_picture_too_large_or_empty_is_refused(context: moderngl.Context) -> N
 
 
 def test_more_characters_than_pools_are_refused(stage: Stage) -> None:
-    tiny = character_of(*_box((0, 0, 0), (0.1, 0.1, 0.1)))
+    tiny = box((0, 0, 0), (0.1, 0.1, 0.1))
     for _ in range(16):
         stage.add(tiny)
     with pytest.raises(InputError, match="holds 16 characters at most"):
