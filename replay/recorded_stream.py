@@ -7,6 +7,7 @@ from typing import Protocol, Self, runtime_checkable
 
 from devices.skeleton import Skeleton, SkeletonFrame
 from devices.stream import SkeletonStream
+from replay.playback import Playback, playback_of
 
 Keep = Callable[[SkeletonFrame], None]
 
@@ -49,6 +50,11 @@ class RecordedStream:
     def ended(self) -> bool:
         """True once no frame can come any more."""
         return self._stream.ended
+
+    @property
+    def playback(self) -> Playback | None:
+        """The playback of the stream; None where that is live."""
+        return playback_of(self._stream)
 
     def poll(self) -> Sequence[SkeletonFrame]:
         """Every frame that has come since the last poll, oldest first."""

@@ -8,7 +8,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from devices.skeleton import Skeleton
+from devices.stream import open_stream
+from replay.playback import playback_of
 from replay.player import EveryFrame, FrameTiming, Player, RealTime
+from replay.recorded_stream import RecordedStream
 from replay.recording import Recording
 
 POINT = Skeleton(("point",), np.array([-1]), np.zeros((1, 3)))
@@ -193,7 +196,7 @@ def test_a_closed_player_has_ended() -> None:
     st.booleans(),
     st.lists(
         st.tuples(
-            st.sampled_from(["poll", "seek", "pause", "resume"]),
+            st.sampled_from(["poll", "seek", "pause", "resume", "speed", "loop"]),
             st.floats(0, 2, allow_nan=False),
         ),
         max_size=40,
@@ -214,6 +217,10 @@ def test_time_never_falls_whatever_is_done(
             player.pause()
         elif act == "resume":
             player.resume()
+        elif act == "speed":
+            player.speed = 0.01 + amount
+        elif act == "loop":
+            player.loop = amount < 1.0
         for frame in player.poll():
             assert frame.time >= newest - 1e-9
             assert not frame.arrival < frame.time - 1e-9
@@ -224,3 +231,116 @@ def test_time_never_falls_whatever_is_done(
 def test_a_speed_that_is_none_is_refused(speed: float) -> None:
     with pytest.raises(ValueError, match="speed"):
         RealTime(speed)
+    for timing in (RealTime(2.0), EveryFrame()):
+        player = Player(recording(UNEVEN), timing)
+        before = player.speed
+        with pytest.raises(ValueError, match="speed"):
+            player.speed = speed
+        assert player.speed == before
+
+
+def test_another_speed_goes_on_from_where_playback_is() -> None:
+    clock = Clock()
+    player = Player(recording(UNEVEN), RealTime(1.0, clock))
+    player.poll()
+    clock.now += 0.12
+    player.speed = 0.1
+    clock.now += 0.2  # 0.02 recorded
+    (first,) = player.poll()
+    assert first.time == pytest.approx(1000.1), "due before the change"
+    clock.now += 0.2  # 0.16 recorded
+    (second,) = player.poll()
+    assert second.time == pytest.approx(1000.12 + 0.03 / 0.1)
+    player.speed = 100.0
+    clock.now += 0.01
+    assert polled(player) == [3, 4]
+
+
+def test_the_speed_is_what_it_was_set_to_before_the_first_frame() -> None:
+    clock = Clock()
+    player = Player(recording(UNEVEN), RealTime(1.0, clock))
+    player.speed = 2.0
+    player.poll()
+    clock.now += 0.06
+    assert polled(player) == [1]
+
+
+@pytest.mark.parametrize("real", [False, True])
+def test_a_loop_may_be_switched_while_playing(real: bool) -> None:
+    clock = Clock()
+    player = Player(recording(UNEVEN), RealTime(1.0, clock) if real else EveryFrame(), loop=True)
+
+    def polled_later() -> list[int]:
+        clock.now += 0.1000001
+        return polled(player)
+
+    played = [number for _ in range(7) for number in polled_later()]
+    assert played[:5] == [0, 1, 2, 3, 4]
+    player.loop = False
+    for _ in range(9):
+        played += polled_later()
+    assert played == [0, 1, 2, 3, 4] * 2
+    assert player.ended
+    clock.now += 100.0
+    player.loop = True
+    assert not player.ended
+    assert polled(player) == [0]
+    assert len(polled_later()) <= 2
+
+
+def test_a_loop_switched_off_at_its_last_frame_ends_there() -> None:
+    player = Player(recording(UNEVEN), EveryFrame(), loop=True)
+    for _ in range(5):
+        player.poll()
+    player.loop = False
+    assert player.ended
+
+
+def test_a_state_that_is_put_back_gives_the_same_frames_again() -> None:
+    player = Player(recording(UNEVEN), EveryFrame(), loop=True)
+    for _ in range(3):
+        player.poll()
+    state = player.snapshot()
+    once = [player.poll()[0] for _ in range(9)]
+    player.seek(0.1)
+    player.poll()
+    for _ in range(2):
+        player.restore(state)
+        assert player.position == UNEVEN[2]
+        again = [player.poll()[0] for _ in range(9)]
+        assert [f.time for f in again] == [f.time for f in once]
+        assert [f.positions[0, 0] for f in again] == [f.positions[0, 0] for f in once]
+
+
+@pytest.mark.parametrize("paused", [False, True])
+def test_a_state_put_back_in_real_time_goes_on_from_there(paused: bool) -> None:
+    clock = Clock()
+    player = Player(recording(UNEVEN), RealTime(1.0, clock))
+    player.poll()
+    clock.now += 0.12
+    assert polled(player) == [1]
+    state = player.snapshot()
+    clock.now += 50.0
+    assert polled(player) == [2, 3, 4]
+    if paused:
+        player.pause()
+    player.restore(state)
+    assert player.position == 0.1
+    assert player.paused == paused
+    if paused:
+        clock.now += 9.0
+        player.resume()
+    assert polled(player) == []
+    clock.now += 0.0300001
+    (frame,) = player.poll()
+    assert (frame.positions[0, 0], frame.time) == (2.0, pytest.approx(clock.now))
+
+
+def test_a_recorded_stream_hands_on_the_playback_and_a_live_one_has_none() -> None:
+    player = Player(recording(UNEVEN), EveryFrame())
+    playback = playback_of(RecordedStream(RecordedStream(player)))
+    assert playback is player
+    assert playback.duration == 0.6
+    with open_stream("sim://wave") as live:
+        assert playback_of(live) is None
+        assert playback_of(RecordedStream(live)) is None

@@ -1,0 +1,77 @@
+"""Playback: what a puppeteer can do to a recording while it plays, and not to a live stream."""
+
+from __future__ import annotations
+
+from typing import Protocol, runtime_checkable
+
+from devices.stream import SkeletonStream
+
+
+class Playback(Protocol):
+    """Playback of a recording; every method may be called between any two frames.
+
+    Attributes:
+        loop: whether playback starts again from the front after the last frame.
+    """
+
+    loop: bool
+
+    @property
+    def position(self) -> float:
+        """Recorded time [s] of the newest frame, or of the last seek; in [0, `duration`]."""
+        ...
+
+    @property
+    def duration(self) -> float:
+        """Recorded time [s] of the last frame."""
+        ...
+
+    @property
+    def speed(self) -> float:
+        """Recorded seconds for each second of the host; without effect where no clock runs."""
+        ...
+
+    @speed.setter
+    def speed(self, speed: float) -> None:
+        """Play at `speed` from now on.
+
+        Raises:
+            ValueError: it is not a finite number above 0.
+        """
+        ...
+
+    @property
+    def paused(self) -> bool:
+        """Whether playback stands still."""
+        ...
+
+    def seek(self, seconds: float) -> None:
+        """Go on from the first frame at or after `seconds` of recorded time (kept within it).
+
+        Raises:
+            ValueError: `seconds` is not a number.
+        """
+        ...
+
+    def pause(self) -> None:
+        """Stand still until `resume`."""
+        ...
+
+    def resume(self) -> None:
+        """Go on from where `pause` stood; the time between is not caught up."""
+        ...
+
+
+@runtime_checkable
+class Played(Protocol):
+    """A stream that may be played back, or that hands on one that may."""
+
+    @property
+    def playback(self) -> Playback | None:
+        """Its playback; None where the frames are live."""
+        ...
+
+
+def playback_of(stream: SkeletonStream) -> Playback | None:
+    """Return the playback of a recorded stream, however it is wrapped; None for a live one."""
+    return stream.playback if isinstance(stream, Played) else None
