@@ -1,8 +1,8 @@
 """The player: a recording as a stream that no loop can tell from a live one.
 
 The player's timeline is recorded time that always rises. Where playback starts again from the
-front, jumps or pauses, recorded times are shifted so that the timeline goes on. A `FrameTiming` says
-how far the timeline has come, and which time of the host a moment on the timeline has.
+front, jumps or pauses, recorded times are shifted so that the timeline goes on. A `FrameTiming`
+gives how far the timeline has come, and the time of the host at a moment of the timeline.
 """
 
 from __future__ import annotations

@@ -19,6 +19,7 @@ from devices.errors import InputError
 from devices.stream import SkeletonStream, open_stream
 from replay.builtin import builtin_recording
 from replay.formats import read_recording
+from replay.playback import playback_of
 from replay.player import EveryFrame, Player, RealTime
 from replay.recorded_stream import RecordedStream
 from replay.recorder import Recorder
@@ -28,7 +29,7 @@ from runtime.characters.character import Character
 from runtime.characters.open_character import load_character
 from runtime.conditioning.switches import asked_for, for_live, for_recording
 from runtime.control.actions import ShowControls
-from runtime.control.keys import Controls
+from runtime.control.keys import WindowControls
 from runtime.control.remote import PORT, Remote
 from runtime.control.window import Window
 from runtime.driving.mapping import Mapping, read_mapping
@@ -191,7 +192,7 @@ class _Show:
         progress = self._closing.enter_context(Progress("performing", total))
         controls = None
         if self._window is not None and self._scene is not None:
-            controls = Controls(self._window, self._scene, desk)
+            controls = WindowControls(self._window, self._scene, desk)
         pace = AtOnce() if options.fast else pace_of(self._source.stream)
         spare = SpareTime(pace, loop)
         self._closing.enter_context(objects_frozen())
@@ -235,11 +236,11 @@ class _Show:
         """What a puppeteer reaches, by keys or from afar."""
         return ShowControls(
             cues=ActGroup([act.match_session for act in self._acts]),
-            stream=self._source.stream,
             conditioning=self._conditioning,
             loop=loop,
             surfaces=[puppet.surface for puppet in self._puppets],
             takes=self._open_takes(),
+            playback=playback_of(self._stream),
             scene=self._scene,
         )
 

@@ -1,16 +1,16 @@
-"""All that a puppeteer can do while a show runs: one table, by whatever name it is asked for.
+"""The table of everything a puppeteer can do while a show runs.
 
-Keys (`runtime.control.keys`) and remote controls (`runtime.control.remote`) are names for these
-actions and nothing more.
+Keys (`runtime.control.keys`), the OSC remote (`runtime.control.remote`), the documentation and the
+tests read the names, texts and ranges of this table and have none of their own.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from enum import Enum
 
-from devices.stream import SkeletonStream
-from replay.player import Player
+from replay.playback import Playback
 from runtime.conditioning.switches import SWITCHES, Conditioning
 from runtime.puppet.deformable_surface import DeformableSurface, Elasticity
 from runtime.show.act_group import Cues
@@ -18,37 +18,40 @@ from runtime.show.loop import FrameLoop
 from runtime.show.scene import Scene
 from runtime.show.takes import Takes
 
-STEP = 0.1  # of a fader's way that a key moves it
-MOST = {
-    "cartoon": 1.0,
-    "volume_gain": 2.0,  # the middle of its fader is all of the volume
-    "stiffness": 0.99,  # a limb that could not bend at all would have no answer
-}
+STEP = 0.1  # share of a fader's range that one key press moves it
 
 
 @dataclass(slots=True, eq=False)
 class ShowControls:
-    """What actions act upon.
+    """The parts of a show that actions change.
 
     Attributes:
-        cues: who decides what drives what.
-        stream: where frames come from; a `Player` can be held and wound back.
-        conditioning: what is done to them.
-        loop: performs them.
-        surfaces: the characters' surfaces.
-        takes: records.
-        theatre: where the show is seen, or None where nobody sees it.
-        leaving: whether it is time to go.
+        cues: matching, of all acts.
+        conditioning: the switches of the conditioning.
+        loop: the frame loop, which freezes the characters.
+        surfaces: the surfaces of all characters.
+        takes: the recorder of takes.
+        playback: the playback of a recording; None where the stream is live.
+        scene: the picture; None where no picture is drawn.
+        leaving: whether the show is to end.
     """
 
     cues: Cues
-    stream: SkeletonStream
     conditioning: Conditioning
     loop: FrameLoop
     surfaces: Sequence[DeformableSurface]
     takes: Takes
+    playback: Playback | None = None
     scene: Scene | None = None
     leaving: bool = False
+
+
+class Kind(Enum):
+    """How an action is operated."""
+
+    PRESS = "press"
+    SWITCH = "switch"
+    FADER = "fader"
 
 
 Do = Callable[[ShowControls], None]
@@ -58,13 +61,13 @@ Write = Callable[[ShowControls, float], None]
 
 @dataclass(frozen=True, slots=True)
 class Action:
-    """Something that can be done.
+    """One row of the table.
 
     Attributes:
-        text: what it does, in a few words.
-        press: does it as a button or a key would; None for a fader.
-        write: sets its value in [0, 1]; None where there is nothing to be set.
-        read: gives its value in [0, 1], for a light or a fader that shows it.
+        text: what the action does, in a few words.
+        press: does it, as a button or a key does; None for a fader.
+        write: sets its value in [0, 1]; None where there is no value to set.
+        read: returns its value in [0, 1], for a light or a fader; None where there is none.
     """
 
     text: str
@@ -72,185 +75,230 @@ class Action:
     write: Write | None = None
     read: Read | None = None
 
-
-def _switch(
-    text: str, read: Callable[[ShowControls], bool], write: Callable[[ShowControls, bool], None]
-) -> Action:
-    """On or off: turned over when pressed, or set."""
-    return Action(
-        text,
-        press=lambda desk: write(desk, not read(desk)),
-        write=lambda desk, value: write(desk, value >= 0.5),
-        read=lambda desk: float(read(desk)),
-    )
+    @property
+    def kind(self) -> Kind:
+        """How the action is operated: a switch can be pressed and set, a fader only set."""
+        if self.press is None:
+            return Kind.FADER
+        return Kind.PRESS if self.write is None else Kind.SWITCH
 
 
-def _fader(text: str, field: str) -> Action:
-    """Something that all characters are made of; it shows the first's."""
-    return Action(
-        text,
-        write=lambda desk, value: _make(desk, field, value),
-        read=lambda desk: _made_of(desk, field),
-    )
+@dataclass(frozen=True, slots=True)
+class Slider:
+    """A number that all characters' surfaces share, with one fader and two keys.
+
+    Attributes:
+        field: its field of `Elasticity`, in [0, `most`].
+        most: the fader's upper end.
+        text: what the fader sets.
+        more: what the action that raises it does.
+        less: what the action that lowers it does.
+    """
+
+    field: str
+    most: float
+    text: str
+    more: str
+    less: str
+
+    def read(self, controls: ShowControls) -> float:
+        """Return the first character's value as a share of the fader's range."""
+        value = float(getattr(controls.surfaces[0].elasticity, self.field))
+        return min(value / self.most, 1.0)
+
+    def write(self, controls: ShowControls, share: float) -> None:
+        """Set all characters to a share of the fader's range."""
+        for surface in controls.surfaces:
+            changed: Elasticity = replace(surface.elasticity, **{self.field: share * self.most})
+            if changed != surface.elasticity:
+                surface.elasticity = changed
+
+    def move(self, controls: ShowControls, by: float) -> None:
+        """Move the fader by a share of its range; a value beyond its upper end stays."""
+        share = self.read(controls)
+        moved = min(max(share + by, 0.0), 1.0)
+        if moved != share:
+            self.write(controls, moved)
 
 
-def _nudge(text: str, field: str, by: float) -> Action:
-    """A fader moved a little."""
-
-    def press(desk: ShowControls) -> None:
-        now = _made_of(desk, field)
-        moved = min(max(now + by, 0.0), 1.0)
-        if moved != now:
-            _make(desk, field, moved)
-
-    return Action(text, press=press)
-
-
-def _made_of(desk: ShowControls, field: str) -> float:
-    return min(float(getattr(desk.surfaces[0].elasticity, field)) / MOST[field], 1.0)
-
-
-def _make(desk: ShowControls, field: str, value: float) -> None:
-    for surface in desk.surfaces:
-        changed: Elasticity = replace(surface.elasticity, **{field: value * MOST[field]})
-        if changed != surface.elasticity:
-            surface.elasticity = changed
-
-
-def _conditioning(name: str, text: str) -> Action:
-    """A switch of the conditioning."""
-
-    def write(desk: ShowControls, on: bool) -> None:
-        desk.conditioning.switch(name, on)
-
-    return _switch(text, lambda desk: bool(getattr(desk.conditioning, name)), write)
-
-
-def _accept(desk: ShowControls) -> None:
-    if desk.cues.matching:
-        desk.cues.accept()
-
-
-def _player(desk: ShowControls) -> Player | None:
-    return desk.stream if isinstance(desk.stream, Player) else None
-
-
-def _play(desk: ShowControls) -> None:
-    if (player := _player(desk)) is not None:
-        player.resume()
-
-
-def _pause(desk: ShowControls) -> None:
-    if (player := _player(desk)) is not None:
-        player.pause()
-
-
-def _paused(desk: ShowControls) -> bool:
-    player = _player(desk)
-    return player is not None and player.paused
-
-
-def _home(desk: ShowControls) -> None:
-    if (player := _player(desk)) is not None:
-        player.seek(0.0)
-
-
-def _record(desk: ShowControls, on: bool) -> None:
-    if on:
-        desk.takes.start()
-    else:
-        desk.takes.stop()
-
-
-def _freeze(desk: ShowControls, on: bool) -> None:
-    desk.loop.frozen = on
-
-
-def _blackout(desk: ShowControls, on: bool) -> None:
-    if desk.scene is not None:
-        desk.scene.blackout.to(float(on))
-
-
-def _chains(desk: ShowControls, on: bool) -> None:
-    if desk.scene is not None:
-        desk.scene.highlights = on
-
-
-def _frame_all(desk: ShowControls) -> None:
-    if desk.scene is not None:
-        desk.scene.frame_all()
-
-
-def _leave(desk: ShowControls) -> None:
-    desk.leaving = True
-
+SLIDERS: Mapping[str, Slider] = {
+    "cartoon": Slider(
+        "cartoon",
+        1.0,
+        "how much characters squash and stretch, from not at all",
+        "more squash and stretch",
+        "less squash and stretch",
+    ),
+    "volume": Slider(
+        "volume_gain",
+        2.0,  # the middle of the fader keeps exactly the volume
+        "how much of their volume is kept; more than all of it above the middle",
+        "keep more of the volume",
+        "keep less of the volume",
+    ),
+    "stiffness": Slider(
+        "stiffness",
+        0.99,  # at 1 the deformation of a limb has no solution
+        "how stiff limbs are between their joints",
+        "stiffer limbs",
+        "softer limbs",
+    ),
+}
 
 STEPS = {
-    "order": "dropping what comes late or twice, on or off",
+    "order": "dropping late and duplicate frames, on or off",
     "identities": "steady identities, on or off",
     "swaps": "putting swapped limbs right, on or off",
     "outliers": "the gate for outliers, on or off",
     "filter": "smoothing, on or off",
     "predict": "prediction, on or off",
     "level": "levelling the floor, on or off",
-    "mirror": "mirror, on or off",
+    "mirror": "exchanging left and right, on or off",
     "scale": "one size for all performers, on or off",
-    "recalibrate": "calibrating by a T or A pose that is held, on or off",
+    "recalibrate": "calibrating by a T or A pose kept still, on or off",
 }
+
+
+def _switch(
+    text: str, read: Callable[[ShowControls], bool], write: Callable[[ShowControls, bool], None]
+) -> Action:
+    """Build an action that is on or off: a press reverses it, `write` sets it."""
+    return Action(
+        text,
+        press=lambda controls: write(controls, not read(controls)),
+        write=lambda controls, value: write(controls, value >= 0.5),
+        read=lambda controls: float(read(controls)),
+    )
+
+
+def _slider_actions(name: str, slider: Slider) -> dict[str, Action]:
+    """Build a slider's fader and the two actions that move it by a step."""
+    return {
+        name: Action(slider.text, write=slider.write, read=slider.read),
+        f"{name}-up": Action(slider.more, press=lambda controls: slider.move(controls, STEP)),
+        f"{name}-down": Action(slider.less, press=lambda controls: slider.move(controls, -STEP)),
+    }
+
+
+def _conditioning(name: str, text: str) -> Action:
+    """Build the action of one switch of the conditioning."""
+
+    def write(controls: ShowControls, on: bool) -> None:
+        controls.conditioning.switch(name, on)
+
+    return _switch(text, lambda controls: bool(getattr(controls.conditioning, name)), write)
+
+
+def _accept(controls: ShowControls) -> None:
+    if controls.cues.matching:
+        controls.cues.accept()
+
+
+def _is_paused(controls: ShowControls) -> bool:
+    return controls.playback is not None and controls.playback.paused
+
+
+def _pause(controls: ShowControls, on: bool) -> None:
+    if controls.playback is None:
+        return
+    if on:
+        controls.playback.pause()
+    else:
+        controls.playback.resume()
+
+
+def _home(controls: ShowControls) -> None:
+    if controls.playback is not None:
+        controls.playback.seek(0.0)
+
+
+def _record(controls: ShowControls, on: bool) -> None:
+    if on:
+        controls.takes.start()
+    else:
+        controls.takes.stop()
+
+
+def _freeze(controls: ShowControls, on: bool) -> None:
+    controls.loop.frozen = on
+
+
+def _blackout(controls: ShowControls, on: bool) -> None:
+    if controls.scene is not None:
+        controls.scene.blackout.to(float(on))
+
+
+def _chains(controls: ShowControls, on: bool) -> None:
+    if controls.scene is not None:
+        controls.scene.highlights = on
+
+
+def _frame_all(controls: ShowControls) -> None:
+    if controls.scene is not None:
+        controls.scene.frame_all()
+
+
+def _leave(controls: ShowControls) -> None:
+    controls.leaving = True
+
 
 ACTIONS: Mapping[str, Action] = {
     "match-again": Action(
         "match again: strike a pose, the best match is shown",
-        press=lambda desk: desk.cues.match_again(),
-        read=lambda desk: float(desk.cues.matching),
+        press=lambda controls: controls.cues.match_again(),
+        read=lambda controls: float(controls.cues.matching),
     ),
     "accept": Action("accept the match shown; the pose is the rest state", press=_accept),
-    "next-match": Action("the next match", press=lambda desk: desk.cues.next_match()),
-    "previous-match": Action("the match before", press=lambda desk: desk.cues.previous_match()),
-    "rest-pose": Action("the pose is the rest state", press=lambda desk: desk.cues.take_rest()),
+    "next-match": Action("the next match", press=lambda controls: controls.cues.next_match()),
+    "previous-match": Action(
+        "the match before", press=lambda controls: controls.cues.previous_match()
+    ),
+    "rest-pose": Action(
+        "the pose is the rest state", press=lambda controls: controls.cues.take_rest()
+    ),
     "calibrate": Action(
         "calibrate: the pose is the rest state, floor and sizes are measured anew",
-        press=lambda desk: desk.cues.calibrate(),
+        press=lambda controls: controls.cues.calibrate(),
     ),
-    "hold": _switch(
-        "hold or go on (a recording)", _paused, lambda desk, on: (_pause if on else _play)(desk)
+    "hold": _switch("pause or resume playback (a recording)", _is_paused, _pause),
+    "play": Action(
+        "resume playback (a recording)",
+        press=lambda controls: _pause(controls, False),
+        read=lambda controls: float(not _is_paused(controls)),
     ),
-    "play": Action("go on (a recording)", press=_play, read=lambda desk: float(not _paused(desk))),
-    "pause": Action("hold (a recording)", press=_pause, read=lambda desk: float(_paused(desk))),
+    "pause": Action(
+        "pause playback (a recording)",
+        press=lambda controls: _pause(controls, True),
+        read=lambda controls: float(_is_paused(controls)),
+    ),
     "home": Action("back to the start (a recording)", press=_home),
     "record": _switch(
         "begin or end a take: the performer goes to a new file",
-        lambda desk: desk.takes.recording,
+        lambda controls: controls.takes.recording,
         _record,
     ),
     "freeze": _switch(
-        "freeze: characters hold still while the stream goes on",
-        lambda desk: desk.loop.frozen,
+        "freeze: characters stand still while the stream goes on",
+        lambda controls: controls.loop.frozen,
         _freeze,
     ),
     "blackout": _switch(
         "blackout: fade to black, and back",
-        lambda desk: desk.scene is not None and desk.scene.blackout.target > 0.0,
+        lambda controls: controls.scene is not None and controls.scene.blackout.target > 0.0,
         _blackout,
     ),
     "frame-all": Action("frame every character", press=_frame_all),
     "chains": _switch(
         "show or hide the matched chains",
-        lambda desk: desk.scene is not None and desk.scene.highlights,
+        lambda controls: controls.scene is not None and controls.scene.highlights,
         _chains,
     ),
-    "cartoon": _fader("how much characters squash and stretch, from not at all", "cartoon"),
-    "cartoon-up": _nudge("more squash and stretch", "cartoon", STEP),
-    "cartoon-down": _nudge("less squash and stretch", "cartoon", -STEP),
-    "volume": _fader(
-        "how much of their volume is kept; more than all of it above the middle", "volume_gain"
-    ),
-    "volume-up": _nudge("keep more of the volume", "volume_gain", STEP),
-    "volume-down": _nudge("keep less of the volume", "volume_gain", -STEP),
-    "stiffness": _fader("how stiff limbs are between their joints", "stiffness"),
-    "stiffness-up": _nudge("stiffer limbs", "stiffness", STEP),
-    "stiffness-down": _nudge("softer limbs", "stiffness", -STEP),
+    **{
+        name: action
+        for slider_name, slider in SLIDERS.items()
+        for name, action in _slider_actions(slider_name, slider).items()
+    },
     **{name: _conditioning(name, STEPS[name]) for name in SWITCHES},
     "leave": Action("leave", press=_leave),
 }
-"""Every action by its name. One more is one more line here, and a key in `runtime.control.keys`."""
+"""Every action by its name. A new action is one more row, and a key in `runtime.control.keys`."""

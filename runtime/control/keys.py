@@ -1,8 +1,8 @@
-"""What the keys do while a window is open."""
+"""The action of each key, and the window's keys and mouse at work."""
 
 from __future__ import annotations
 
-from runtime.control.actions import ACTIONS, ShowControls
+from runtime.control.actions import ACTIONS, Kind, ShowControls
 from runtime.control.window import Event, KeyPressed, Resized, Window
 from runtime.show.scene import Scene
 
@@ -41,41 +41,41 @@ KEYS = {
 """The action of each key."""
 
 
-class Controls:
-    """Lets the window's keys and mouse steer the show.
+class WindowControls:
+    """Runs the show by the window's keys and mouse.
 
     Args:
-        window: whose keys and mouse.
-        theatre: what is seen in it.
-        desk: what the keys' actions act upon.
+        window: the window that is open.
+        scene: the picture in it; the mouse moves its camera.
+        controls: what the actions of the keys change.
     """
 
-    def __init__(self, window: Window, scene: Scene, desk: ShowControls) -> None:
+    def __init__(self, window: Window, scene: Scene, controls: ShowControls) -> None:
         self._window = window
         self._scene = scene
-        self._desk = desk
+        self._controls = controls
         self._camera = window.camera = scene.camera
 
     def serve(self) -> None:
-        """Do what was asked since the last tick."""
+        """Handle all events since the last tick."""
         events = self._window.poll()
         if self._scene.camera is self._camera:
             self._scene.camera = self._window.camera
         for event in events:
-            self._obey(event)
+            self._handle(event)
         self._camera = self._window.camera = self._scene.camera
-        self._desk.leaving = self._desk.leaving or self._window.should_close
+        self._controls.leaving = self._controls.leaving or self._window.should_close
 
     def present(self) -> None:
         """Show the newest picture in the window."""
         self._scene.stage.show(self._window.framebuffer)
         self._window.swap()
 
-    def _obey(self, event: Event) -> None:
+    def _handle(self, event: Event) -> None:
         if isinstance(event, Resized):
             self._scene.stage.resize(event.size)
         elif isinstance(event, KeyPressed) and event.key in KEYS:
             action = ACTIONS[KEYS[event.key]]
-            is_switch = action.write is not None  # not turned over and over by a key held down
-            if action.press is not None and not (event.again and is_switch):
-                action.press(self._desk)
+            is_repeat = event.again and action.kind is Kind.SWITCH  # by a key that is held down
+            if action.press is not None and not is_repeat:
+                action.press(self._controls)

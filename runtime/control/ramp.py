@@ -1,4 +1,4 @@
-"""A level that goes smoothly to where it is told, from wherever it is."""
+"""A value in [0, 1] that moves smoothly to a new target."""
 
 from __future__ import annotations
 
@@ -8,14 +8,17 @@ from collections.abc import Callable
 
 
 class Ramp:
-    """A level in [0, 1], at 0 until told otherwise.
+    """A value in [0, 1], 0 at first, that moves to each new target in a fixed time.
+
+    A ramp belongs to the light, not to the performance: it runs on the host's clock, so it has no
+    snapshot.
 
     Args:
-        seconds: how long it takes to get where it goes.
+        seconds: how long a move takes.
         clock: host monotonic time [s].
 
     Attributes:
-        target: where it is, or is going.
+        target: the value at the end of the move.
     """
 
     def __init__(self, seconds: float, clock: Callable[[], float] = time.perf_counter) -> None:
@@ -27,14 +30,14 @@ class Ramp:
 
     @property
     def level(self) -> float:
-        """Where it is now; it starts and arrives softly."""
+        """The value now; a move starts and ends softly, by 3s^2 - 2s^3 of its time."""
         share = (self._clock() - self._since) / self._seconds
         if share >= 1.0:
             return self.target
         share = max(share, 0.0)
         level = self._from + (self.target - self._from) * share * share * (3.0 - 2.0 * share)
-        return min(max(level, 0.0), 1.0)  # whatever rounding makes of its ends
+        return min(max(level, 0.0), 1.0)  # rounding may leave the range
 
     def to(self, target: float) -> None:
-        """Go to `target` from now on."""
+        """Move to `target`, from the value that it has now."""
         self._from, self.target, self._since = self.level, target, self._clock()

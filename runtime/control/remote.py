@@ -1,9 +1,9 @@
-"""A remote control over OSC: a phone or a foot pedal runs the show from where the performer stands.
+"""The OSC remote: a phone, a foot pedal or another program runs the show over UDP.
 
-``/bunraku/ACTION`` presses an action of `runtime.control.actions`: it is done without an argument
-or with 1, and not with 0, which buttons send when they are let go. A fader is set by its value in
-[0, 1], a switch by ``/bunraku/ACTION/set``. Whoever spoke last is told how things are, as
-``/bunraku/state/ACTION``, so that lights and faders follow.
+``/bunraku/ACTION`` presses an action of `runtime.control.actions`: without an argument or with 1 it
+is done, with 0, which buttons send when they are let go, it is not. A fader is set by its value in
+[0, 1], a switch by ``/bunraku/ACTION/set``. The last sender receives the state of all actions as
+``/bunraku/state/ACTION``, so that its lights and faders follow.
 """
 
 from __future__ import annotations
@@ -32,82 +32,82 @@ PORT = 9100
 ROOT = "/bunraku/"
 STATE = ROOT + "state/"
 SET = "/set"
-WAITING = 64  # presses that wait for a tick at most
-AT_ONCE = 8  # presses that a tick does at most: a flood of them does not hold up the show
-ANSWERS = 10.0  # a second, at most
-REPEATED = 1.0  # [s] after which all is told again, since datagrams get lost
+WAITING = 64  # most presses that wait for a tick
+AT_ONCE = 8  # most presses that one tick does, so that a flood does not delay the show
+ANSWERS = 10.0  # most answers a second
+REPEATED = 1.0  # [s] after which the whole state is sent again, since datagrams get lost
 LONGEST = 1472  # bytes of a bundle in an Ethernet packet
-MOST_COMPLAINTS = 8
-PATIENCE = 2.0  # [s] that closing waits for the reader thread
+MOST_WARNINGS = 8
+PATIENCE = 2.0  # [s] that `close` waits for the reader thread
 
 
 @dataclass(frozen=True, slots=True)
-class Wish:
-    """What one message asks for.
+class Request:
+    """One action that a message asks for.
 
     Attributes:
         action: its name.
-        value: what to set it to, in [0, 1], or None to press it.
+        value: the value to set, in [0, 1]; None for a press.
     """
 
     action: str
     value: float | None = None
 
 
-class WishError(ValueError):
-    """A message that asks for nothing that there is."""
+class RequestError(ValueError):
+    """A message that names no action, or gives no value for one."""
 
 
-def wish_of(message: Message) -> Wish | None:
-    """What a message asks for; None for a button that is let go.
+def request_of(message: Message) -> Request | None:
+    """Return the request of a message; None for a button that is let go.
 
     Raises:
-        WishError: there is no such action, or its value is missing or none.
+        RequestError: no action has this address, or its value is missing or not a number.
     """
     name = message.address.removeprefix(ROOT)
     sets = name.endswith(SET)
     name = name.removesuffix(SET)
     action = ACTIONS.get(name)
     if action is None or not message.address.startswith(ROOT) or (sets and action.write is None):
-        raise WishError("there is no such action, see docs/remote.md")
+        raise RequestError("there is no such action, see docs/remote.md")
     value = _value(message.arguments)
     if sets or action.press is None:
         if value is None:
-            raise WishError("it needs a value from 0 to 1")
-        return Wish(name, min(max(value, 0.0), 1.0))
-    return Wish(name) if value is None or value >= 0.5 else None
+            raise RequestError("it needs a value from 0 to 1")
+        return Request(name, min(max(value, 0.0), 1.0))
+    return Request(name) if value is None or value >= 0.5 else None
 
 
 def _value(arguments: tuple[Argument, ...]) -> float | None:
-    """The one number that is there, or None where nothing is.
+    """Return the one number among the arguments; None where there are none.
 
     Raises:
-        WishError: there is something else.
+        RequestError: the arguments are not one number.
     """
     if not arguments:
         return None
     (first, *more) = arguments
     if more or not isinstance(first, int | float) or math.isnan(first):
-        raise WishError("its value is not one number")
+        raise RequestError("its value is not one number")
     return float(first)
 
 
 class Remote:
-    """Listens for wishes on a thread of its own; the frame loop's thread fulfils them.
+    """Receives requests on a thread of its own; the frame loop's thread does them.
 
     Args:
-        host, port: where it listens; port 0 takes any free one.
-        answer_port: where senders listen; 0 where they listen on the port that they send from.
-        tell: takes one line on a message that asks for nothing that there is.
+        host, port: the address to listen on; port 0 takes any free one.
+        answer_port: the port that senders listen on; 0 for the port that they send from.
+        tell: takes one line on a message that was refused.
         clock: host monotonic time [s].
 
     Attributes:
-        host, port: what it is bound to.
+        host, port: the address that it listens on.
         refused: messages that were not understood.
-        dropped: wishes that came faster than they could be fulfilled.
+        dropped: presses that came faster than ticks could do them.
 
     Raises:
-        InputError: the port cannot be had; the message says why.
+        InputError: the port cannot be opened; the message says why.
     """
 
     def __init__(
@@ -123,34 +123,35 @@ class Remote:
         self._answer_port = answer_port
         self._tell = tell
         self._clock = clock
-        self._complained: set[str] = set()
+        self._warned: set[str] = set()
         self._lock = threading.Lock()
-        self._wishes: dict[str | int, Wish] = {}  # by action, of which only the newest counts,
-        self._pressed = self._waiting = 0  # or by the number of the press
-        self._audience: tuple[str, int] | None = None
-        self._told: dict[str, float] = {}
-        self._told_to: tuple[str, int] | None = None
-        self._answered = self._told_all = -math.inf
+        # Values by the name of their action, so that only the newest counts; presses by number.
+        self._requests: dict[str | int, Request] = {}
+        self._pressed = self._waiting = 0
+        self._sender: tuple[str, int] | None = None
+        self._sent: dict[str, float] = {}
+        self._sent_to: tuple[str, int] | None = None
+        self._answered = self._all_sent = -math.inf
         self._transport = UdpTransport(host, port, scheme="osc")
         self.host, self.port = self._transport.host, self._transport.port
         self._thread = threading.Thread(target=self._listen, name="remote", daemon=True)
         self._thread.start()
 
-    def serve(self, desk: ShowControls) -> None:
-        """Fulfil what was wished for since the last time, and tell how things are now."""
-        for wish in self._next():
-            action = ACTIONS[wish.action]
+    def serve(self, controls: ShowControls) -> None:
+        """Do the requests since the last call, and answer with the state of all actions."""
+        for request in self._next():
+            action = ACTIONS[request.action]
             try:
-                if wish.value is None and action.press is not None:
-                    action.press(desk)
-                elif wish.value is not None and action.write is not None:
-                    action.write(desk, wish.value)
+                if request.value is None and action.press is not None:
+                    action.press(controls)
+                elif request.value is not None and action.write is not None:
+                    action.write(controls, request.value)
             except InputError as error:
-                self._complain(wish.action, str(error))
-        self._answer(desk)
+                self._warn(request.action, str(error))
+        self._answer(controls)
 
     def close(self) -> None:
-        """Give the port back; may be called twice."""
+        """Close the port; may be called twice."""
         self._transport.close()
         self._thread.join(PATIENCE)
 
@@ -175,73 +176,73 @@ class Remote:
             return
         for message in messages:
             try:
-                wish = wish_of(message)
-            except WishError as error:
+                request = request_of(message)
+            except RequestError as error:
                 self.refused += 1
-                self._complain(message.address, str(error))
+                self._warn(message.address, str(error))
                 continue
-            self._heard(source)
-            if wish is not None:
-                self._keep(wish)
+            self._note_sender(source)
+            if request is not None:
+                self._keep(request)
 
-    def _keep(self, wish: Wish) -> None:
+    def _keep(self, request: Request) -> None:
         with self._lock:
-            if wish.value is not None:
-                self._wishes.pop(wish.action, None)
-                self._wishes[wish.action] = wish
+            if request.value is not None:
+                self._requests.pop(request.action, None)
+                self._requests[request.action] = request
             elif self._waiting < WAITING:
-                self._wishes[self._pressed] = wish
+                self._requests[self._pressed] = request
                 self._pressed += 1
                 self._waiting += 1
             else:
                 self.dropped += 1
 
-    def _next(self) -> list[Wish]:
-        """What is to be fulfilled now, in order: as far as the last of `AT_ONCE` presses."""
-        wishes: list[Wish] = []
+    def _next(self) -> list[Request]:
+        """Take the requests to do now, in order: up to the last of `AT_ONCE` presses."""
+        requests: list[Request] = []
         presses = 0
         with self._lock:
-            for key in list(self._wishes):
+            for key in list(self._requests):
                 presses += isinstance(key, int)
                 if presses > AT_ONCE:
                     break
-                wishes.append(self._wishes.pop(key))
+                requests.append(self._requests.pop(key))
                 self._waiting -= isinstance(key, int)
-        return wishes
+        return requests
 
-    def _complain(self, address: str, reason: str) -> None:
-        """Say once what is wrong with a wish, for whoever lays out a phone's buttons."""
+    def _warn(self, address: str, reason: str) -> None:
+        """Report once for each address what is wrong with its messages."""
         shown = ascii(address[:60])
-        if len(self._complained) < MOST_COMPLAINTS and shown not in self._complained:
-            self._complained.add(shown)
+        if len(self._warned) < MOST_WARNINGS and shown not in self._warned:
+            self._warned.add(shown)
             self._tell(f"the remote control asked for {shown}: {reason}")
 
-    def _heard(self, source: Hashable) -> None:
-        """Remember who is to be answered: the last one to speak, if it is on this network."""
+    def _note_sender(self, source: Hashable) -> None:
+        """Answer this sender from now on, if it is on this network."""
         match source:
             case (str(host), int(port)) if _is_near(host):
-                self._audience = (host, self._answer_port or port)
+                self._sender = (host, self._answer_port or port)
 
-    def _answer(self, desk: ShowControls) -> None:
-        """Tell who spoke last what has changed, at most `ANSWERS` times a second."""
-        now, audience = self._clock(), self._audience
-        if audience is None or now - self._answered < 1.0 / ANSWERS:
+    def _answer(self, controls: ShowControls) -> None:
+        """Send the last sender what has changed, at most `ANSWERS` times a second."""
+        now, sender = self._clock(), self._sender
+        if sender is None or now - self._answered < 1.0 / ANSWERS:
             return
-        state = {name: action.read(desk) for name, action in ACTIONS.items() if action.read}
-        if audience == self._told_to and now - self._told_all < REPEATED:
-            news = {name: value for name, value in state.items() if self._told[name] != value}
+        state = {name: action.read(controls) for name, action in ACTIONS.items() if action.read}
+        if sender == self._sent_to and now - self._all_sent < REPEATED:
+            changed = {name: value for name, value in state.items() if self._sent[name] != value}
         else:
-            news, self._told_all = state, now
-        if not news:
+            changed, self._all_sent = state, now
+        if not changed:
             return
-        messages = [write_message(STATE + name, "f", value) for name, value in news.items()]
+        messages = [write_message(STATE + name, "f", value) for name, value in changed.items()]
         for bundle in write_bundles(messages, LONGEST):
-            self._transport.send(bundle, audience)
-        self._told, self._told_to, self._answered = state, audience, now
+            self._transport.send(bundle, sender)
+        self._sent, self._sent_to, self._answered = state, sender, now
 
 
 def _is_near(host: str) -> bool:
-    """Whether an address is this machine's or of its own network; others are never answered."""
+    """Whether an address belongs to this machine or a private network; others get no answer."""
     try:
         address = ipaddress.ip_address(host.partition("%")[0])
     except ValueError:

@@ -1,4 +1,4 @@
-"""The window on the desktop: its OpenGL context, its camera under the mouse, and what is typed."""
+"""The desktop window: its OpenGL context, the camera that the mouse moves, and the keys typed."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ class KeyPressed:
     """A key went down or repeats.
 
     Attributes:
-        key: what is printed on it in lower case, or one of the names in `KEY_NAMES`.
-        shift, control: whether that modifier was held.
-        again: whether it was down already, and repeats.
+        key: the character printed on it, in lower case, or a name in `KEY_NAMES`.
+        shift, control: whether that modifier was down.
+        again: whether the key was down already and repeats.
     """
 
     key: str
@@ -76,16 +76,16 @@ class Window:
     The left button orbits the camera, the right or middle one pans, the wheel zooms.
 
     Args:
-        title: stands above it.
+        title: text of its title bar.
         size: width and height [px].
-        visible: whether anybody sees it.
-        transparent: let the desktop show through where the picture's alpha is low, if the window
-            manager composites; elsewhere that is black.
+        visible: whether it appears on the screen.
+        transparent: let the desktop show through where the picture's alpha is low; needs a
+            compositing window manager, without one such pixels are black.
 
     Attributes:
-        camera: what the mouse moves; set it to frame something else.
+        camera: the camera that the mouse moves; may be set.
         context: the window's GL context.
-        handle: glfw's window; None once it is closed.
+        handle: glfw's window; None after `close`.
 
     Raises:
         InputError: there is no display, or no OpenGL 3.3 on it.
@@ -125,7 +125,7 @@ class Window:
 
     @property
     def framebuffer(self) -> moderngl.Framebuffer:
-        """What `swap` shows."""
+        """The framebuffer that `swap` shows."""
         return self.context.screen
 
     @property
@@ -134,13 +134,13 @@ class Window:
         return bool(glfw.window_should_close(self.handle))
 
     def poll(self) -> list[Event]:
-        """Move the camera by what the mouse did; return what else happened, oldest first."""
+        """Move the camera by the mouse; return all other events, oldest first."""
         glfw.poll_events()
         events, self._events = self._events, []
         return events
 
     def swap(self) -> None:
-        """Show what was drawn into the framebuffer."""
+        """Show the framebuffer on the screen."""
         glfw.swap_buffers(self.handle)
 
     def close(self) -> None:
@@ -190,7 +190,7 @@ class Window:
 
 
 def _open_window(title: str, size: tuple[int, int], hints: Mapping[int, bool]) -> Any:
-    """Ask glfw for a window and make its context current."""
+    """Open a glfw window and make its context current."""
     problems: list[str] = []
     report: Any = lambda _code, text: problems.append(text.decode("utf-8", "replace"))  # noqa: E731  # a lambda fits GLFW's untyped callback
     glfw.set_error_callback(report)

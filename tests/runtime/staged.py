@@ -10,6 +10,7 @@ import moderngl
 from numpy.typing import NDArray
 
 from devices.builtin.simulator import Simulator
+from replay.playback import playback_of
 from replay.player import Player
 from replay.recorded_stream import RecordedStream
 from replay.recorder import Recorder
@@ -99,13 +100,13 @@ class Show:
             tell=self.told.append,
             waits=True,
         )
-        self.desk = ShowControls(
+        self.controls = ShowControls(
             cues=self.match_session,
-            stream=stream,
             conditioning=self.switches,
             loop=self.loop,
             surfaces=[puppet.surface],
             takes=self.takes,
+            playback=playback_of(recorded),
             scene=self.scene,
         )
 

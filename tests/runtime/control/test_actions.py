@@ -13,7 +13,7 @@ from devices.stream import open_stream
 from replay.formats import read_recording
 from replay.player import EveryFrame, Player
 from runtime.conditioning.switches import SWITCHES
-from runtime.control.actions import ACTIONS, MOST
+from runtime.control.actions import ACTIONS, SLIDERS
 from runtime.control.keys import KEYS
 from runtime.puppet.deformable_surface import Elasticity
 from runtime.puppet.puppet import Puppet
@@ -38,15 +38,15 @@ def show(context: moderngl.Context, puppet: Puppet, tmp_path: Path) -> Iterator[
 
 def press(show: Show, *names: str) -> None:
     for name in names:
-        ACTIONS[name].press(show.desk)
+        ACTIONS[name].press(show.controls)
 
 
 def put(show: Show, name: str, value: float) -> None:
-    ACTIONS[name].write(show.desk, value)
+    ACTIONS[name].write(show.controls, value)
 
 
 def light(show: Show, name: str) -> float:
-    return ACTIONS[name].read(show.desk)
+    return ACTIONS[name].read(show.controls)
 
 
 def perform(show: Show) -> None:
@@ -83,9 +83,10 @@ def test_the_documented_table_is_the_table() -> None:
     keys = {name: f"`{key}`" for key, name in KEYS.items()}
     table = []
     for name, action in ACTIONS.items():
-        takes = "fader" if action.press is None else "switch" if action.write else "press"
         tells = "yes" if action.read else ""
-        table.append([f"`/bunraku/{name}`", keys.get(name, ""), action.text, takes, tells])
+        table.append(
+            [f"`/bunraku/{name}`", keys.get(name, ""), action.text, action.kind.value, tells]
+        )
     assert rows == table
 
 
@@ -292,7 +293,7 @@ def test_faders_set_what_every_character_is_made_of(show: Show, name: str) -> No
     for value in (0.0, 0.25, 1.0):
         put(show, name, value)
         made = show.puppet.surface.elasticity
-        assert getattr(made, field) == pytest.approx(value * MOST[field])
+        assert getattr(made, field) == pytest.approx(value * SLIDERS[name].most)
         assert light(show, name) == pytest.approx(value)
         others = {each: getattr(made, each) for each in FADERS.values() if each != field}
         assert others == {each: getattr(Elasticity(), each) for each in others}
@@ -310,7 +311,7 @@ def test_a_character_made_beyond_the_faders_end_is_left_so(show: Show) -> None:
     press(show, "volume-up")
     assert show.puppet.surface.elasticity.volume_gain == 5.0
     press(show, "volume-down")
-    assert show.puppet.surface.elasticity.volume_gain == pytest.approx(0.9 * MOST["volume_gain"])
+    assert show.puppet.surface.elasticity.volume_gain == pytest.approx(0.9 * SLIDERS["volume"].most)
 
 
 def test_more_cartoon_changes_what_is_performed(show: Show) -> None:
@@ -328,10 +329,10 @@ def test_more_cartoon_changes_what_is_performed(show: Show) -> None:
 
 def test_leaving_is_asked_for(show: Show) -> None:
     press(show, "leave")
-    assert show.desk.leaving
+    assert show.controls.leaving
 
 
 def test_without_a_theatre_what_is_seen_cannot_be_changed_and_harms_nothing(show: Show) -> None:
-    show.desk.scene = None
+    show.controls.scene = None
     press(show, "blackout", "chains", "frame-all")
     assert light(show, "blackout") == light(show, "chains") == 0.0

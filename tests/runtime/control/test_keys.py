@@ -11,7 +11,7 @@ import pytest
 
 from replay.player import EveryFrame, Player
 from runtime.control.actions import ACTIONS
-from runtime.control.keys import KEYS, Controls
+from runtime.control.keys import KEYS, WindowControls
 from runtime.control.window import Event, KeyPressed, Resized
 from runtime.puppet.puppet import Puppet
 from runtime.render.camera import Camera, front_camera
@@ -44,15 +44,15 @@ class Seat(Show):
         super().__init__(context, puppet, Player(record(waving(9)), EveryFrame()), folder)
         self.window = Desktop(context)
         self.framed = self.scene.camera
-        self.controls = Controls(self.window, self.scene, self.desk)
+        self.keys = WindowControls(self.window, self.scene, self.controls)
 
     def press(self, *keys: str) -> None:
         self.window.events.extend(KeyPressed(key) for key in keys)
-        self.controls.serve()
+        self.keys.serve()
 
     def state(self) -> dict[str, float]:
         """What every action that shows something shows."""
-        return {name: action.read(self.desk) for name, action in ACTIONS.items() if action.read}
+        return {name: action.read(self.controls) for name, action in ACTIONS.items() if action.read}
 
 
 @pytest.fixture(scope="module")
@@ -88,9 +88,9 @@ def test_a_key_does_what_its_action_does(
         if by_key:
             show.press(key)
         else:
-            ACTIONS[KEYS[key]].press(show.desk)
+            ACTIONS[KEYS[key]].press(show.controls)
         shown = show.strike(0.1).drives
-        states.append((show.state(), shown, show.desk.leaving, show.stream.position))
+        states.append((show.state(), shown, show.controls.leaving, show.stream.position))
         show.close()
     assert states[0] == states[1]
 
@@ -99,14 +99,14 @@ def test_a_key_that_is_held_down_turns_no_switch_over_again_but_steps_on(show: S
     for key in ("b", "up"):
         again = [KeyPressed(key, again=True)] * 3
         show.window.events.extend([KeyPressed(key), *again])
-    show.controls.serve()
+    show.keys.serve()
     assert show.scene.blackout.target == 1.0
     assert show.puppet.surface.elasticity.cartoon == pytest.approx(0.4)
 
 
 def test_f_frames_everybody(show: Seat) -> None:
     show.window.camera = show.window.camera.orbit(0.3, 0.0).zoom(3.0)
-    show.controls.serve()
+    show.keys.serve()
     turned = show.scene.camera
     assert turned == show.window.camera != show.framed
     show.press("f")
@@ -117,30 +117,30 @@ def test_f_frames_everybody(show: Seat) -> None:
 
 def test_who_frames_everybody_from_afar_moves_the_windows_camera_too(show: Seat) -> None:
     show.window.camera = show.window.camera.zoom(3.0)
-    show.controls.serve()
-    ACTIONS["frame-all"].press(show.desk)
+    show.keys.serve()
+    ACTIONS["frame-all"].press(show.controls)
     framed = show.scene.camera
     assert framed != show.window.camera
-    show.controls.serve()
+    show.keys.serve()
     assert show.scene.camera is show.window.camera is framed
     show.window.camera = show.window.camera.orbit(0.2, 0.0)
-    show.controls.serve()
+    show.keys.serve()
     assert show.scene.camera == show.window.camera != framed, "and the mouse goes on from there"
 
 
 def test_escape_and_the_closed_window_end_the_show(show: Seat) -> None:
     show.press()
-    assert not show.desk.leaving
+    assert not show.controls.leaving
     show.press("escape")
-    assert show.desk.leaving
+    assert show.controls.leaving
     show.press()
-    assert show.desk.leaving, "for good"
+    assert show.controls.leaving, "for good"
 
 
 def test_the_windows_own_button_ends_the_show(show: Seat) -> None:
     show.window.should_close = True
     show.press()
-    assert show.desk.leaving
+    assert show.controls.leaving
 
 
 def test_the_camera_is_the_windows_from_the_start(show: Seat) -> None:
@@ -152,13 +152,13 @@ def test_the_camera_is_the_windows_from_the_start(show: Seat) -> None:
 
 def test_another_size_of_the_window_is_the_pictures_size(show: Seat) -> None:
     show.window.events.append(Resized((40, 30)))
-    show.controls.serve()
+    show.keys.serve()
     assert show.scene.stage.size == (40, 30)
 
 
 def test_what_is_shown_is_the_newest_picture(show: Seat) -> None:
     show.scene.show(None, [show.puppet.deform()])
-    show.controls.present()
+    show.keys.present()
     assert show.window.swaps == 1
     shown = np.frombuffer(show.window.framebuffer.read(components=3, alignment=1), np.uint8)
     np.testing.assert_array_equal(
@@ -170,5 +170,5 @@ def test_other_keys_change_nothing(show: Seat) -> None:
     before = show.state()
     show.press("q", "f5", "tab", "é")
     assert show.state() == before
-    assert not show.desk.leaving
+    assert not show.controls.leaving
     assert show.scene.camera == show.framed

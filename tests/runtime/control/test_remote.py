@@ -24,13 +24,13 @@ from runtime.control.remote import (
     ANSWERS,
     AT_ONCE,
     LONGEST,
-    MOST_COMPLAINTS,
+    MOST_WARNINGS,
     WAITING,
     Remote,
-    Wish,
-    WishError,
+    Request,
+    RequestError,
     _is_near,
-    wish_of,
+    request_of,
 )
 from runtime.puppet.puppet import Puppet
 from tests.runtime.staged import Show
@@ -66,7 +66,7 @@ class Staged(Show):
         while not there():
             assert time.monotonic() < deadline, "it never came"
             self.loop.tick()
-            self.remote.serve(self.desk)
+            self.remote.serve(self.controls)
             self.time += 1.0 / 60.0
 
     def close(self) -> None:
@@ -123,9 +123,9 @@ def test_the_whole_table_is_at_hand_by_its_names(show: Staged) -> None:
             show.client.send_message(f"/bunraku/{name}", 1.0)
         if action.write is not None:
             show.client.send_message(f"/bunraku/{name}/set", 0.5)
-        show.until(lambda: show.remote._waiting == 0 and not show.remote._wishes)
+        show.until(lambda: show.remote._waiting == 0 and not show.remote._requests)
     show.client.send_message("/bunraku/leave", 1.0)
-    show.until(lambda: show.desk.leaving)
+    show.until(lambda: show.controls.leaving)
     assert show.remote.refused == show.remote.dropped == 0
     assert not show.told
 
@@ -155,9 +155,9 @@ def test_a_switch_can_be_set_whatever_it_was(show: Staged) -> None:
 
 
 def test_what_is_asked_for_is_done_in_order(show: Staged) -> None:
-    """Also where it all comes at once, and one wish takes the place of another."""
-    wishes = [("mirror/set", 1.0), ("mirror", 1.0), ("mirror/set", 1.0), ("freeze", 1.0)]
-    messages = [write_message(f"/bunraku/{name}", "f", value) for name, value in wishes]
+    """Also where it all comes at once, and one request takes the place of another."""
+    requests = [("mirror/set", 1.0), ("mirror", 1.0), ("mirror/set", 1.0), ("freeze", 1.0)]
+    messages = [write_message(f"/bunraku/{name}", "f", value) for name, value in requests]
     (bundle,) = write_bundles(messages, 1400)
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         sender.sendto(bundle, (LOOPBACK, show.remote.port))
@@ -207,7 +207,7 @@ def test_who_sends_and_listens_on_one_port_is_answered_there(show: Staged) -> No
         pedal.connect((LOOPBACK, show.remote.port))  # hears nobody else
         pedal.send(write_message("/bunraku/freeze"))
         show.until(lambda: show.loop.frozen)
-        show.until(lambda: show.remote._told_to is not None)
+        show.until(lambda: show.remote._sent_to is not None)
         assert b"/bunraku/state/freeze" in pedal.recv(65535)
 
 
@@ -215,11 +215,11 @@ def test_answers_are_few_and_small_however_much_changes(show: Staged) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as asker:
         asker.bind((LOOPBACK, 0))
         asker.sendto(write_message("/bunraku/freeze"), (LOOPBACK, show.remote.port))
-        show.until(lambda: show.remote._told_to is not None)
+        show.until(lambda: show.remote._sent_to is not None)
         began = show.time
         while show.time < began + 10.0:
             show.switches.mirror = not show.switches.mirror
-            show.remote.serve(show.desk)
+            show.remote.serve(show.controls)
             show.time += 1.0 / 240.0
         asker.setblocking(False)
         answers = []
@@ -251,22 +251,24 @@ def test_only_this_network_is_answered(host: str, near: bool) -> None:
 
 
 def test_messages_and_what_they_ask_for() -> None:
-    def ask(address: str, *arguments: object) -> Wish | None:
-        return wish_of(Message(address, "", arguments))
+    def ask(address: str, *arguments: object) -> Request | None:
+        return request_of(Message(address, "", arguments))
 
-    assert ask("/bunraku/mirror") == ask("/bunraku/mirror", 1) == Wish("mirror")
+    assert ask("/bunraku/mirror") == ask("/bunraku/mirror", 1) == Request("mirror")
     assert ask("/bunraku/mirror", 0) is ask("/bunraku/mirror", False) is None
-    assert ask("/bunraku/mirror/set", 0) == Wish("mirror", 0.0)
-    assert ask("/bunraku/cartoon", 0.3) == ask("/bunraku/cartoon/set", 0.3) == Wish("cartoon", 0.3)
+    assert ask("/bunraku/mirror/set", 0) == Request("mirror", 0.0)
+    assert (
+        ask("/bunraku/cartoon", 0.3) == ask("/bunraku/cartoon/set", 0.3) == Request("cartoon", 0.3)
+    )
     wrong = [
         "/bunraku/none", "/bunraku/", "/bunraku", "/mirror", "mirror", "/bunraku/mirror/",
         "/bunraku/accept/set", "/bunraku/mirror/set/set", "/bunraku/state/mirror", "/bunraku/*",
     ]  # fmt: skip
     for address in wrong:
-        with pytest.raises(WishError):
+        with pytest.raises(RequestError):
             ask(address, 1)
     for value in ("1", b"1", None, float("nan")):
-        with pytest.raises(WishError):
+        with pytest.raises(RequestError):
             ask("/bunraku/mirror", value)
 
 
@@ -279,7 +281,7 @@ def test_hostile_datagrams_neither_stop_nor_steer_it(show: Staged) -> None:
         bad = bytearray(good)
         bad[chance.randrange(len(bad))] ^= 1 << chance.randrange(8)
         junk.append(bytes(bad))
-    state = {name: action.read(show.desk) for name, action in ACTIONS.items() if action.read}
+    state = {name: action.read(show.controls) for name, action in ACTIONS.items() if action.read}
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
         for start in range(0, len(junk), 50):  # no faster than they are read
             for data in junk[start : start + 50]:
@@ -288,24 +290,24 @@ def test_hostile_datagrams_neither_stop_nor_steer_it(show: Staged) -> None:
             sender.sendto(write_message("/bunraku/freeze"), (LOOPBACK, show.remote.port))
             show.until(lambda before=before: show.loop.frozen is not before)
     assert show.remote.refused > 500
-    assert len(show.told) <= MOST_COMPLAINTS
+    assert len(show.told) <= MOST_WARNINGS
     assert all(line.isascii() and "\n" not in line and len(line) < 400 for line in show.told)
-    after = {name: action.read(show.desk) for name, action in ACTIONS.items() if action.read}
+    after = {name: action.read(show.controls) for name, action in ACTIONS.items() if action.read}
     changed = {name for name in state if state[name] != after[name]}
     assert changed <= {"freeze", "mirror"}, "a flipped bit of a value may leave it a press"
 
 
 def test_a_flood_is_bounded_and_a_tick_does_a_little_of_it(show: Staged) -> None:
-    press = Wish("mirror")
+    press = Request("mirror")
     for _ in range(10 * WAITING):
         show.remote._keep(press)
-        show.remote._keep(Wish("cartoon", 0.5))
-    assert len(show.remote._wishes) == WAITING + 1
+        show.remote._keep(Request("cartoon", 0.5))
+    assert len(show.remote._requests) == WAITING + 1
     assert show.remote.dropped == 9 * WAITING
     for left in range(WAITING - AT_ONCE, -1, -AT_ONCE):
-        show.remote.serve(show.desk)
+        show.remote.serve(show.controls)
         assert show.remote._waiting == left
-    assert not show.remote._wishes
+    assert not show.remote._requests
 
 
 def test_an_unknown_address_is_told_once_with_what_to_do(show: Staged) -> None:
