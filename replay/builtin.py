@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from devices.builtin.motions import performance
+from devices.builtin.motions import motion_clip
 from replay.recording import Recording
 
 
@@ -14,7 +14,7 @@ def builtin_recording(name: str = "show") -> Recording:
     Raises:
         InputError: there is none of that name; the message lists those there are.
     """
-    act = performance(name)
+    act = motion_clip(name)
     frames, joints = act.positions.shape[:2]
     return Recording(
         skeleton=act.skeleton,

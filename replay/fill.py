@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from devices.compiled import kernel
 from devices.skeleton import Skeleton, SkeletonFrame
 
-HOLD_SECONDS = 0.5
+KEEP_SECONDS = 0.5
 EASE_SECONDS = 1.0
 MOST_PERFORMERS = 64  # that are remembered; a sensor may number people anew for ever
 FARTHEST = 100.0  # [m] from the origin; what claims to lie further was not seen
@@ -79,7 +79,7 @@ class Filler:
     """
 
     def __init__(
-        self, skeleton: Skeleton, *, hold: float = HOLD_SECONDS, ease: float = EASE_SECONDS
+        self, skeleton: Skeleton, *, hold: float = KEEP_SECONDS, ease: float = EASE_SECONDS
     ) -> None:
         self.skeleton = skeleton
         self.hold = hold

@@ -14,9 +14,9 @@ from replay.kinect.laban import read_laban, recognises_laban
 from replay.kinect.msr import read_msr, recognises_msr
 from replay.kinect.ntu import read_ntu, recognises_ntu
 from replay.kinect.ut import read_ut, recognises_ut
-from replay.leap.files import read_leap, recognises_leap
-from replay.mcap.file import read_mcap, recognises_mcap
-from replay.mediapipe.files import read_mediapipe, recognises_mediapipe
+from replay.leap.reader import read_leap, recognises_leap
+from replay.mcap.reader import read_mcap, recognises_mcap
+from replay.mediapipe.reader import read_mediapipe, recognises_mediapipe
 from replay.recording import Recording
 
 HEAD_BYTES = 4096

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from devices.errors import InputError
 from devices.skeleton import Skeleton
-from replay.mcap.file import decode_skeleton, encode_skeleton
+from replay.mcap.reader import decode_skeleton, encode_skeleton
 from replay.recording import Recording
 
 Array = NDArray[np.float64]

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.bodies.anatomy import BodyPart, Kind, Side, first_of, heading_joints
+from devices.bodies.joint_labels import first_of, heading_joints
+from devices.bodies.joint_names import BodyPart, Kind, Side
 from devices.skeleton import Skeleton
 
 Array = NDArray[np.float64]

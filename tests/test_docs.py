@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 from PIL import Image
 
-from devices.bodies.anatomy import PRESETS
-from devices.builtin.motions import ACTS
+from devices.bodies.source_joints import PRESETS
+from devices.builtin.motions import MOTIONS
 from replay.formats import formats
 from runtime.characters.builtin import BUILTIN
 from runtime.characters.character_file import SUFFIXES
@@ -148,7 +148,7 @@ def test_names_that_a_reader_may_type_are_there() -> None:
     readme, characters = page("README.md"), page("docs/characters.md")
     for name in BUILTIN:
         assert f"`{name}`" in characters
-    for act in ACTS:
+    for act in MOTIONS:
         assert f"{act}`" in readme
     for suffix in SUFFIXES:
         assert suffix[1:] in readme

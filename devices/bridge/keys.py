@@ -28,7 +28,7 @@ _MAX_ALLOWED = 256
 
 
 @dataclass(frozen=True, slots=True)
-class BridgeKeys:
+class PublisherKeys:
     """The bridge's pair, and the stages that it lets in; all as 40 characters of Z85."""
 
     public: bytes
@@ -37,7 +37,7 @@ class BridgeKeys:
 
 
 @dataclass(frozen=True, slots=True)
-class StageKeys:
+class SubscriberKeys:
     """A stage's pair, and the bridge that it trusts; all as 40 characters of Z85."""
 
     public: bytes
@@ -70,7 +70,7 @@ def make_keys(folder: Path) -> None:
         raise InputError(f"cannot write keys to {folder}: {error.strerror or error}") from error
 
 
-def read_bridge_keys(folder: Path) -> BridgeKeys:
+def read_publisher_keys(folder: Path) -> PublisherKeys:
     """The keys of the capture machine.
 
     Raises:
@@ -80,17 +80,17 @@ def read_bridge_keys(folder: Path) -> BridgeKeys:
     allowed = sorted((folder / _ALLOWED).glob(f"*{_PUBLIC}"))[:_MAX_ALLOWED]
     if not allowed:
         raise InputError(f"{folder / _ALLOWED} holds no stage's public key, so none could come in")
-    return BridgeKeys(public, secret, frozenset(_read(path)[0] for path in allowed))
+    return PublisherKeys(public, secret, frozenset(_read(path)[0] for path in allowed))
 
 
-def read_stage_keys(folder: Path) -> StageKeys:
+def read_subscriber_keys(folder: Path) -> SubscriberKeys:
     """The keys of the stage machine.
 
     Raises:
         InputError: they are not there, damaged, or can be read by others.
     """
     public, secret = _read_pair(folder / f"{STAGE}{_SECRET}")
-    return StageKeys(public, secret, _read(folder / f"{_BRIDGE}{_PUBLIC}")[0])
+    return SubscriberKeys(public, secret, _read(folder / f"{_BRIDGE}{_PUBLIC}")[0])
 
 
 def is_loopback(host: str) -> bool:

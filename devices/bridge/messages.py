@@ -21,14 +21,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.bridge.numbers import make_safe
+from devices.bridge.sanitize import make_safe
 from devices.errors import InputError
 from devices.skeleton import Skeleton, SkeletonFrame
 
 VERSION = 1
 MAX_JOINTS = 1024
 MAX_MESSAGE = 1 << 18  # bytes; a frame of 1024 joints with rotations takes a quarter of it
-MAX_WINDOW = 4096
+MAX_CREDIT = 4096
 LATEST, LOSSLESS, LEAVING = 0, 1, 2
 MODES = {"latest": LATEST, "lossless": LOSSLESS}
 
@@ -52,7 +52,7 @@ class Call:
         session: the bridge that it has heard so far; 0 before any.
         received: the highest sequence number that has come.
         called_at: its clock [s].
-        window: how many frames beyond that may be under way, 0 to `MAX_WINDOW`.
+        credit: how many frames beyond that may be under way, 0 to `MAX_CREDIT`.
         mode: `LATEST` or `LOSSLESS`; `LEAVING` is its last word.
     """
 
@@ -60,7 +60,7 @@ class Call:
     session: int
     received: int
     called_at: float
-    window: int
+    credit: int
     mode: int
 
 
@@ -127,7 +127,7 @@ Message = Call | Answer | Announcement | Sample | OtherVersion
 
 def encode_call(call: Call) -> bytes:
     """The bytes of a call."""
-    fields = (call.client, call.session, call.received, call.called_at, call.window, call.mode)
+    fields = (call.client, call.session, call.received, call.called_at, call.credit, call.mode)
     return _head(1) + _CALL.pack(*fields)
 
 
@@ -195,7 +195,7 @@ def _decode_call(body: bytes) -> Call | None:
     if len(body) != _CALL.size:
         return None
     call = Call(*_CALL.unpack(body))
-    known = call.mode in (LATEST, LOSSLESS, LEAVING) and call.window <= MAX_WINDOW
+    known = call.mode in (LATEST, LOSSLESS, LEAVING) and call.credit <= MAX_CREDIT
     return call if known and math.isfinite(call.called_at) else None
 
 

@@ -13,12 +13,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from devices.bridge.clock import ClockOffset
+from devices.bridge.clock_offset import ClockOffset
 from devices.bridge.messages import (
     LATEST,
     LEAVING,
     LOSSLESS,
-    MAX_WINDOW,
+    MAX_CREDIT,
     Announcement,
     Answer,
     Call,
@@ -27,11 +27,11 @@ from devices.bridge.messages import (
     decode,
     encode_call,
 )
-from devices.bridge.numbers import make_safe
+from devices.bridge.sanitize import make_safe
 from devices.skeleton import Skeleton, SkeletonFrame
 
 BEAT = 0.25  # [s] between calls when there is nothing else to say
-WINDOW = {LATEST: 16, LOSSLESS: 1024}
+CREDIT = {LATEST: 16, LOSSLESS: 1024}
 """How many frames may be under way at once: few where only the newest count, so that a slow
 network holds no old ones."""
 
@@ -94,30 +94,30 @@ class BridgeReceiver:
                 self.refused += 1
         return []
 
-    def call_due(self, now: float, held_back: int = 0) -> bool:
+    def call_due(self, now: float, waiting: int = 0) -> bool:
         """Whether the bridge should hear from us: a beat has passed, or it may soon run dry.
 
         Args:
             now: our clock [s].
-            held_back: frames that came and wait to be taken; so many fewer are asked for, so that a
+            waiting: frames that came and wait to be taken; so many fewer are asked for, so that a
                 stage that stands still holds the bridge back.
         """
-        more = self._came + self._window(held_back) - self._told
-        return now - self._called_at >= BEAT or more >= WINDOW[self._mode] // 4
+        more = self._came + self._credit(waiting) - self._told
+        return now - self._called_at >= BEAT or more >= CREDIT[self._mode] // 4
 
-    def call(self, now: float, held_back: int = 0) -> bytes:
-        """What to say to the bridge at this time [s]; `held_back` as for `call_due`."""
-        window = self._window(held_back)
+    def call(self, now: float, waiting: int = 0) -> bytes:
+        """What to say to the bridge at this time [s]; `waiting` as for `call_due`."""
+        credit = self._credit(waiting)
         self._called_at = now
-        self._told = self._came + window
-        return encode_call(Call(self._client, self._announced, self._came, now, window, self._mode))
+        self._told = self._came + credit
+        return encode_call(Call(self._client, self._announced, self._came, now, credit, self._mode))
 
     def farewell(self, now: float) -> bytes:
         """The last word, so that the bridge keeps nothing for us."""
         return encode_call(Call(self._client, self._announced, self._came, now, 0, LEAVING))
 
-    def _window(self, held_back: int) -> int:
-        return max(WINDOW[self._mode] - held_back, 0)
+    def _credit(self, waiting: int) -> int:
+        return max(CREDIT[self._mode] - waiting, 0)
 
     def _answer(self, answer: Answer, arrival: float) -> None:
         if answer.session != self.session:
@@ -129,7 +129,7 @@ class BridgeReceiver:
         elif answer.sent > self._came:
             self.lost += answer.sent - self._came
             self._came = answer.sent
-        elif self._came - answer.sent > MAX_WINDOW:
+        elif self._came - answer.sent > MAX_CREDIT:
             self._came = answer.sent
         if self.clock.add(answer.called_at, answer.heard_at, answer.answered_at, arrival):
             self.heard_at = arrival

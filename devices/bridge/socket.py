@@ -10,7 +10,7 @@ from enum import Enum
 import zmq
 from zmq.utils.monitor import recv_monitor_message
 
-from devices.bridge.keys import BridgeKeys, StageKeys
+from devices.bridge.keys import PublisherKeys, SubscriberKeys
 from devices.bridge.messages import MAX_MESSAGE
 
 DOMAIN = "bunraku"
@@ -41,7 +41,7 @@ _OUTCOMES = {
 
 
 def bridge_socket(
-    context: Context, kind: int, endpoint: str, keys: BridgeKeys | StageKeys | None
+    context: Context, kind: int, endpoint: str, keys: PublisherKeys | SubscriberKeys | None
 ) -> Socket:
     """A socket for `endpoint`, a ROUTER at the bridge and a DEALER at the stage.
 
@@ -53,7 +53,7 @@ def bridge_socket(
     socket.ipv6 = "[" in endpoint
     socket.maxmsgsize = MAX_MESSAGE
     socket.rcvhwm = _QUEUE
-    socket.sndhwm = 0  # what is under way is bounded by the stage's window
+    socket.sndhwm = 0  # what is under way is bounded by the stage's credit
     socket.heartbeat_ivl = _SIGN_OF_LIFE
     socket.heartbeat_timeout = _DEAD
     socket.reconnect_ivl, socket.reconnect_ivl_max = _RECONNECT
@@ -61,9 +61,9 @@ def bridge_socket(
         socket.immediate = True  # a call that waits for a connection asks for an old time
     if keys is not None:
         socket.curve_publickey, socket.curve_secretkey = keys.public, keys.secret
-    if isinstance(keys, StageKeys):
+    if isinstance(keys, SubscriberKeys):
         socket.curve_serverkey = keys.bridge
-    if isinstance(keys, BridgeKeys):
+    if isinstance(keys, PublisherKeys):
         socket.curve_server = True
         socket.zap_domain = DOMAIN.encode()
         socket.setsockopt(zmq.ZAP_ENFORCE_DOMAIN, 1)

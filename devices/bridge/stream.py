@@ -19,9 +19,9 @@ from urllib.parse import SplitResult
 import zmq
 
 from devices.address import host_and_port, one_of, options_of, positive
-from devices.bridge.inbox import BridgeInbox, EveryOne, NewestOfEach
-from devices.bridge.keys import StageKeys, check_guarded, read_stage_keys
-from devices.bridge.messages import LATEST, MAX_WINDOW, MODES, VERSION
+from devices.bridge.frame_queues import AllFrames, FrameQueue, LatestFrames
+from devices.bridge.keys import SubscriberKeys, check_guarded, read_subscriber_keys
+from devices.bridge.messages import LATEST, MAX_CREDIT, MODES, VERSION
 from devices.bridge.receiver import BridgeReceiver
 from devices.bridge.socket import Context, Handshake, Handshakes, bridge_socket, tcp_endpoint
 from devices.errors import InputError
@@ -48,7 +48,7 @@ class Bridge:
 
     endpoint: str
     mode: int = LATEST
-    keys: StageKeys | None = None
+    keys: SubscriberKeys | None = None
     patience: float = PATIENCE
 
 
@@ -69,8 +69,8 @@ class BridgeStream:
         self._bridge = bridge
         self._clock = clock
         self._receiver = BridgeReceiver(bridge.mode)
-        self._inbox: BridgeInbox = (
-            NewestOfEach() if bridge.mode == LATEST else EveryOne(2 * MAX_WINDOW)
+        self._inbox: FrameQueue = (
+            LatestFrames() if bridge.mode == LATEST else AllFrames(2 * MAX_CREDIT)
         )
         self._listeners: tuple[Callable[[SkeletonFrame], None], ...] = ()
         self._rhythm = Rhythm()
@@ -190,9 +190,9 @@ class BridgeStream:
             self._release()
 
     def _call(self) -> None:
-        now, held_back = self._clock(), self._inbox.held_back
-        if self._receiver.call_due(now, held_back):
-            self._say(self._receiver.call(now, held_back))
+        now, waiting = self._clock(), self._inbox.waiting
+        if self._receiver.call_due(now, waiting):
+            self._say(self._receiver.call(now, waiting))
 
     def _say(self, data: bytes) -> None:
         with suppress(zmq.Again):  # no connection just now; the next call will do
@@ -256,7 +256,7 @@ def open_device(address: SplitResult) -> BridgeStream:
         Bridge(
             endpoint=tcp_endpoint(host, port),
             mode=MODES[options.get("mode", "latest")],
-            keys=None if keys is None else read_stage_keys(keys),
+            keys=None if keys is None else read_subscriber_keys(keys),
             patience=options.get("wait", PATIENCE),
         )
     )

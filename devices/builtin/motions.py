@@ -10,8 +10,8 @@ from itertools import chain
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.builtin.performance import BuiltinMotion, Gesture, Performance, Turn, played
-from devices.builtin.puppet_body import FINGERS, SIDES, finger_direction, finger_joints
+from devices.builtin.body import FINGERS, SIDES, finger_direction, finger_joints
+from devices.builtin.gestures import BuiltinMotion, Gesture, MotionClip, Turn, sample_motion
 from devices.errors import InputError
 
 _FORWARD = np.array([-0.66, -0.74, 0.0])  # turns the left forearm towards the front
@@ -211,20 +211,20 @@ def _acts() -> dict[str, BuiltinMotion]:
     return {"show": show, "arms": arms, "walk": walk, "wave": wave, "fingers": fingers, "bow": bow}
 
 
-ACTS = tuple(_acts())
+MOTIONS = tuple(_acts())
 """Names of what the built-in performer can do; the first is all of it."""
 
 
 @cache
-def performance(name: str) -> Performance:
+def motion_clip(name: str) -> MotionClip:
     """One loop of the act called `name`.
 
     Raises:
         InputError: there is none of that name; the message lists those there are.
     """
-    if name not in ACTS:
+    if name not in MOTIONS:
         raise InputError(
-            f"no built-in performance is called {name!r}; there are: {', '.join(ACTS)}"
+            f"no built-in performance is called {name!r}; there are: {', '.join(MOTIONS)}"
         )
     act = _acts()[name]
-    return played(replace(act, gestures=(*act.gestures, *_breathing(act.seconds))))
+    return sample_motion(replace(act, gestures=(*act.gestures, *_breathing(act.seconds))))

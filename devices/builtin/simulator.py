@@ -13,8 +13,8 @@ from urllib.parse import SplitResult
 import numpy as np
 
 from devices.address import options_of
-from devices.builtin.motions import ACTS, performance
-from devices.builtin.performance import RATE, Performance
+from devices.builtin.gestures import RATE, MotionClip
+from devices.builtin.motions import MOTIONS, motion_clip
 from devices.skeleton import Skeleton, SkeletonFrame
 
 BACKLOG_SECONDS = 1.0
@@ -34,7 +34,7 @@ class Simulator:
 
     def __init__(
         self,
-        performance: Performance,
+        performance: MotionClip,
         clock: Callable[[], float] = time.perf_counter,
         *,
         performers: int = 1,
@@ -99,7 +99,7 @@ class Simulator:
 def open_device(address: SplitResult) -> Simulator:
     """Open ``sim://ACT``; the first act where none is named."""
     options = options_of(address, {"performers": _company})
-    return Simulator(performance(address.netloc or ACTS[0]), **options)
+    return Simulator(motion_clip(address.netloc or MOTIONS[0]), **options)
 
 
 def _company(text: str) -> int:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.errors import InputError
-from devices.kinect.bodies import Sensor, SensorBody, Sight
+from devices.kinect.bodies import Sensor, SensorBody, SensorFrame
 from devices.kinect.joints import AZURE_TO_WORLD, KINECT_AZURE
 from devices.transport.sdk_library import SensorLostError
 
@@ -130,7 +130,7 @@ class ImuSample(ctypes.Structure):
     )
 
 
-def read_sight(data: bytes) -> Sight:
+def read_sensor_frame(data: bytes) -> SensorFrame:
     """What the bytes of a `Header` and its bodies show.
 
     Raises:
@@ -143,7 +143,7 @@ def read_sight(data: bytes) -> Sight:
     if header.bodies > MOST_BODIES or len(data) != size:
         raise ValueError(f"expected {header.bodies} bodies, got {len(data)} bytes")
     bodies = np.frombuffer(data, np.dtype(AzureBody), offset=ctypes.sizeof(Header))
-    return Sight(
+    return SensorFrame(
         time=header.time * 1e-6,
         bodies=[_body(body) for body in bodies if body["id"] != INVALID_ID],
         up=np.array(header.up, dtype=np.float64),
@@ -161,7 +161,7 @@ def _body(body: np.void) -> SensorBody:
     )
 
 
-SENSOR = Sensor(KINECT_AZURE, AZURE_TO_WORLD, ("FootLeft", "FootRight"), read_sight)
+SENSOR = Sensor(KINECT_AZURE, AZURE_TO_WORLD, ("FootLeft", "FootRight"), read_sensor_frame)
 
 
 @dataclass(frozen=True, slots=True)

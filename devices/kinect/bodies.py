@@ -1,7 +1,7 @@
 """Bodies as a depth camera reports them, made into frames: what all Kinects have in common.
 
 Camera axes become ours as `devices.kinect.joints` says; the floor is y = 0 and upright by
-`devices.bodies.floor_level`, and the camera stands above the origin. Orientations keep the local
+`devices.bodies.camera_level`, and the camera stands above the origin. Orientations keep the local
 axes that the SDK gives a joint and are turned into the world; an SDK's all-zero quaternion means
 that there is none.
 """
@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from devices.bodies.body_numbers import BodyNumbers
-from devices.bodies.floor_level import FloorLevel
+from devices.bodies.camera_level import CameraLevel
+from devices.bodies.performer_numbers import PerformerNumbers
 from devices.skeleton import Skeleton, SkeletonFrame
 from devices.transport.clock_map import ClockMap
 
@@ -44,7 +44,7 @@ class SensorBody:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Sight:
+class SensorFrame:
     """What a sensor saw at one moment.
 
     Attributes:
@@ -68,13 +68,13 @@ class Sensor:
         skeleton: its joints.
         to_world: (3, 3) camera axes to ours.
         feet: the joints that stand on the floor.
-        read: makes a `Sight` of the bytes of one SDK frame; raises ValueError where they are none.
+        read: decodes the bytes of one SDK frame; raises ValueError for other bytes.
     """
 
     skeleton: Skeleton
     to_world: Array
     feet: tuple[str, ...]
-    read: Callable[[bytes], Sight]
+    read: Callable[[bytes], SensorFrame]
 
 
 class KinectDecoder:
@@ -91,8 +91,8 @@ class KinectDecoder:
     def __init__(self, sensor: Sensor, *, level: bool = True) -> None:
         self._sensor = sensor
         self._level = level
-        self._floor = FloorLevel()
-        self._numbers = BodyNumbers()
+        self._floor = CameraLevel()
+        self._numbers = PerformerNumbers()
         self._clock = ClockMap()
         self._feet = [sensor.skeleton.index(name) for name in sensor.feet]
         self.refused = 0
@@ -106,22 +106,22 @@ class KinectDecoder:
     def feed(self, data: bytes, arrival: float) -> Sequence[SkeletonFrame]:
         """A frame of each person in the SDK's frame `data` that came at `arrival` [s]."""
         try:
-            sight = self._sensor.read(data)
+            sensor_frame = self._sensor.read(data)
         except ValueError:
             self.refused += 1
             return []
-        time = self._clock.host_time(sight.time, arrival)
-        bodies = {body.id: _in_world(body, self._sensor.to_world) for body in sight.bodies}
+        time = self._clock.host_time(sensor_frame.time, arrival)
+        bodies = {body.id: _in_world(body, self._sensor.to_world) for body in sensor_frame.bodies}
         if self._level:
-            self._learn_floor(sight, list(bodies.values()))
+            self._learn_floor(sensor_frame, list(bodies.values()))
         numbers = self._numbers({body.id: _middle(body) for body in bodies.values()})
         return [
             self._frame(body, numbers[body.id], time, arrival)
             for body in sorted(bodies.values(), key=lambda body: numbers[body.id])
         ]
 
-    def _learn_floor(self, sight: Sight, bodies: Sequence[SensorBody]) -> None:
-        self._floor.learn(self._sensor.to_world @ sight.up, sight.height)
+    def _learn_floor(self, sensor_frame: SensorFrame, bodies: Sequence[SensorBody]) -> None:
+        self._floor.learn(self._sensor.to_world @ sensor_frame.up, sensor_frame.height)
         for body in bodies:
             feet = body.positions[self._feet][body.confidence[self._feet] > _SURE]
             if len(feet):

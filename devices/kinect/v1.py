@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.errors import InputError
-from devices.kinect.bodies import Sensor, SensorBody, Sight
+from devices.kinect.bodies import Sensor, SensorBody, SensorFrame
 from devices.kinect.joints import CONFIDENCE_OF_STATE, KINECT_TO_WORLD, KINECT_V1
 from devices.transport.sdk_library import SensorLostError
 
@@ -94,7 +94,7 @@ class Packet(ctypes.Structure):
 _PACKET = np.dtype(Packet)
 
 
-def read_sight(data: bytes) -> Sight:
+def read_sensor_frame(data: bytes) -> SensorFrame:
     """What the bytes of a `Packet` show.
 
     Raises:
@@ -107,7 +107,7 @@ def read_sight(data: bytes) -> Sight:
     people = frame["people"]
     tracked = (people["tracking_state"] == _TRACKED) & (people["tracking_id"] != 0)
     floor = frame["floor"]["values"].astype(np.float64)
-    return Sight(
+    return SensorFrame(
         time=float(frame["time"]) * _MILLISECOND,
         bodies=[_body(people[slot], bones[slot]) for slot in np.flatnonzero(tracked)],
         up=floor[:3],
@@ -127,7 +127,7 @@ def _body(person: np.void, bones: NDArray[np.void]) -> SensorBody:
     )
 
 
-SENSOR = Sensor(KINECT_V1, KINECT_TO_WORLD, ("FootLeft", "FootRight"), read_sight)
+SENSOR = Sensor(KINECT_V1, KINECT_TO_WORLD, ("FootLeft", "FootRight"), read_sensor_frame)
 
 
 class KinectV1:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.errors import InputError
-from devices.kinect.bodies import Sensor, SensorBody, Sight
+from devices.kinect.bodies import Sensor, SensorBody, SensorFrame
 from devices.kinect.joints import CONFIDENCE_OF_STATE, KINECT_TO_WORLD, KINECT_V2
 from devices.transport.sdk_library import SensorLostError
 
@@ -83,7 +83,7 @@ class Packet(ctypes.Structure):
 _PACKET = np.dtype(Packet)
 
 
-def read_sight(data: bytes) -> Sight:
+def read_sensor_frame(data: bytes) -> SensorFrame:
     """What the bytes of a `Packet` show.
 
     Raises:
@@ -94,7 +94,7 @@ def read_sight(data: bytes) -> Sight:
     packet = np.frombuffer(data, _PACKET)[0]
     floor = packet["floor"].astype(np.float64)
     bodies = packet["bodies"]
-    return Sight(
+    return SensorFrame(
         time=float(packet["time"]) * _TICK,
         bodies=[_body(bodies[slot]) for slot in np.flatnonzero(bodies["tracked"])],
         up=floor[:3],
@@ -119,7 +119,7 @@ def _is_joint(types: NDArray[np.int32]) -> NDArray[np.bool_]:
     return (types >= 0) & (types < JOINTS)
 
 
-SENSOR = Sensor(KINECT_V2, KINECT_TO_WORLD, ("FootLeft", "FootRight"), read_sight)
+SENSOR = Sensor(KINECT_V2, KINECT_TO_WORLD, ("FootLeft", "FootRight"), read_sensor_frame)
 
 
 def _method(thing: ctypes.c_void_p, place: int, *types: type) -> Callable[..., int]:

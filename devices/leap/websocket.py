@@ -19,8 +19,8 @@ from urllib.parse import SplitResult
 
 from devices.address import host_and_port, one_of, options_of
 from devices.errors import InputError
-from devices.leap.messages import MOST_BYTES, LeapDecoder
 from devices.leap.performer import BOTH
+from devices.leap.websocket_messages import MOST_BYTES, LeapDecoder
 from devices.transport.live_stream import Deliver, LiveStream
 
 PORT = 6437

@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.bodies.body_numbers import BodyNumbers
 from devices.bodies.camera_position import camera_position
+from devices.bodies.performer_numbers import PerformerNumbers
 from devices.mediapipe.joints import (
     HAND_LANDMARKS,
     MIDDLES,
@@ -60,7 +60,7 @@ class LandmarkDecoder:
         self._columns = {name: column for column, name in enumerate(self._skeleton.names)}
         self._focal = 0.5 / math.tan(math.radians(0.5 * view))  # in widths of the image
         self._clock = ClockMap()
-        self._numbers = BodyNumbers()
+        self._numbers = PerformerNumbers()
         self._origin: Array | None = None
         self._places: dict[int, Array] = {}
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.kinect.joints import KINECT_V2
-from devices.osc.joint_messages import JointFormat
+from devices.osc.nimate_messages import JointFormat
 from devices.osc.openni_joints import OPENNI
 
 Array = NDArray[np.float64]

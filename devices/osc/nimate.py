@@ -28,12 +28,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.address import host_and_port, one_of, options_of, positive
-from devices.bodies.body_numbers import BodyNumbers
 from devices.bodies.forward_kinematics import rotate
+from devices.bodies.performer_numbers import PerformerNumbers
 from devices.kinect.joints import KINECT_V2
 from devices.osc.camera_bodies import CameraBody
-from devices.osc.joint_messages import JointFormat, JointMessage, read_joints
 from devices.osc.messages import Message, OscError, read_packet
+from devices.osc.nimate_messages import JointFormat, JointMessage, read_joints
 from devices.osc.openni_joints import OPENNI, joint_called, openni_choice
 from devices.osc.skelecaster import HEAD, read_bodies
 from devices.skeleton import Skeleton, SkeletonFrame
@@ -96,7 +96,7 @@ class NimateDecoder:
         self._omni = omni
         self._kinect = format in (JointFormat.KINECT, SKELECASTER)
         self._users: dict[int, _User] = {}
-        self._numbers = BodyNumbers()
+        self._numbers = PerformerNumbers()
         self._synced = -math.inf
         self._last: tuple[bytes, float] = b"", -math.inf
 

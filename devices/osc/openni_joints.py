@@ -13,14 +13,14 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.bodies.humanoid_points import Point, at, skeleton_on_humanoid
 from devices.bodies.joint_names import Kind, Side, part_of_name
+from devices.bodies.skeleton_on_humanoid import JointOnHumanoid, at, skeleton_on_humanoid
 from devices.kinect.joints import KINECT_V2
 
 LONGEST_NAME = 128
 
 _HALF_OF_HAND = 0.5
-_POINTS: dict[str, Point] = {
+_POINTS: dict[str, JointOnHumanoid] = {
     "Pelvis": ("", "Hips", "Spine", -0.75),
     "Torso": at("Pelvis", "Chest"),
     "Neck": ("Torso", "UpperChest", "Neck", 0.65),

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.address import host_and_port, options_of
-from devices.bodies.tracker_places import HEAD, JOINTS, places_of, tracker_skeleton
+from devices.bodies.tracker_joints import HEAD, JOINTS, assign_trackers, tracker_skeleton
 from devices.bodies.unity_space import across_unity, turn_across_unity, unity_euler
 from devices.osc.messages import Message, OscError, read_packet
 from devices.skeleton import SkeletonFrame
@@ -118,7 +118,7 @@ class VrchatDecoder:
         head = self._positions[_HEAD_ID] if _HEAD_ID in there else None
         turn = self._turns[_HEAD_ID]
         facing = None if head is None or np.isnan(turn).any() else turn
-        places = places_of(self._positions[new], head, facing, taken=kept.values())
+        places = assign_trackers(self._positions[new], head, facing, taken=kept.values())
         self._places = {**kept, **dict(zip(new, places.tolist(), strict=True))}
 
 

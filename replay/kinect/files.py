@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from devices.bodies.anatomy import hips_joint, label_joints
+from devices.bodies.joint_labels import hips_joint, label_joints
 from devices.errors import InputError
 from devices.skeleton import Skeleton
 from replay.orientation import floor_and_start, standing_axis, upright, yaw_to_front

@@ -1,4 +1,4 @@
-"""Frames to an MCAP file, such that a crash costs less than a second; see `replay.mcap.file`."""
+"""Frames to an MCAP file, such that a crash costs less than a second; see `replay.mcap.reader`."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import Self
 
 from devices.errors import InputError
 from devices.skeleton import Skeleton, SkeletonFrame
-from replay.mcap.file import (
+from replay.mcap.reader import (
     FRAME_SCHEMA,
     PERFORMER_TOPIC,
     SKELETON_NAME,
@@ -24,7 +24,7 @@ from replay.mcap.file import (
     encode_frame,
     encode_skeleton,
 )
-from replay.mcap.sink import McapSink
+from replay.mcap.record_writer import McapRecordWriter
 
 SYNC_SECONDS = 0.5
 
@@ -69,7 +69,7 @@ class McapWriter:
         self._synced = (clock(), -math.inf)
         self._closed = False
         try:
-            self._sink = McapSink(path)
+            self._sink = McapRecordWriter(path)
         except OSError as error:
             raise InputError(f"cannot write {path}: {error.strerror or error}") from error
         self._thread = ThreadPoolExecutor(max_workers=1, thread_name_prefix="mcap-fsync")

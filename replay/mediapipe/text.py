@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from devices.errors import InputError
 from devices.mediapipe.joints import HAND_LANDMARKS, POSE_LANDMARKS, SIDES
-from replay.mediapipe.landmarks import Take, course
+from replay.mediapipe.landmarks import PersonLandmarks, track
 
 Array = NDArray[np.float64]
 Point = tuple[float, float, float, float]  # x, y, z, confidence
@@ -82,8 +82,8 @@ def has_landmark_text(head: bytes) -> bool:
     return len(first) > column and _pose_name(first[column]) is not None
 
 
-def parse_landmark_text(data: bytes) -> tuple[list[Take], list[str]]:
-    """The takes (one) in a table or JSON, and what was assumed about them.
+def parse_landmark_text(data: bytes) -> tuple[list[PersonLandmarks], list[str]]:
+    """The people (one) in a table or JSON, and what was assumed about them.
 
     Raises:
         InputError: no landmark of MediaPipe's can be found in it.
@@ -97,18 +97,18 @@ def parse_landmark_text(data: bytes) -> tuple[list[Take], list[str]]:
         raise InputError("it names no landmark of MediaPipe's")
     notes: list[str] = []
     times = _moment_times(moments, notes)
-    groups = {group: _courses(moments, group) for group in _GROUPS}
+    groups = {group: _tracks(moments, group) for group in _GROUPS}
     world, image = groups["world"], groups["image"]
     if not world and _in_metres(image):
         world, image = image, {}
         notes.append("landmarks are taken to be of the world: the hips are at the origin")
     in_image = [image, groups["left"], groups["right"]]
     if any(in_image) and _normalised(in_image):
-        in_image = [_stretched(courses) for courses in in_image]
+        in_image = [_stretched(tracks) for tracks in in_image]
         if not world:
             notes.append("the image's shape is not given; 16:9 is assumed")
     image, left, right = in_image
-    return [Take(times, 0, world, image, {"left": left, "right": right})], notes
+    return [PersonLandmarks(times, 0, world, image, {"left": left, "right": right})], notes
 
 
 # -- tables ---------------------------------------------------------------------------------------
@@ -274,7 +274,7 @@ def _json_point(item: Any) -> Point:
     return _point([float(v) if isinstance(v, int | float) else math.nan for v in item[:4]])
 
 
-# -- from moments to courses ----------------------------------------------------------------------
+# -- from moments to tracks ----------------------------------------------------------------------
 
 
 def _moment_times(moments: Sequence[_Moment], notes: list[str]) -> Array:
@@ -288,18 +288,18 @@ def _moment_times(moments: Sequence[_Moment], notes: list[str]) -> Array:
     return np.maximum.accumulate(times)
 
 
-def _courses(moments: Sequence[_Moment], group: str) -> dict[str, Array]:
+def _tracks(moments: Sequence[_Moment], group: str) -> dict[str, Array]:
     names = dict.fromkeys(name for m in moments for name in m.groups.get(group, {}))
     unseen: Point = (math.nan, math.nan, math.nan, 0.0)
     found = {}
     for name in names:
         rows = np.array([m.groups.get(group, {}).get(name, unseen) for m in moments])
-        found[name] = course(rows[:, :3], rows[:, 3])
+        found[name] = track(rows[:, :3], rows[:, 3])
     return found
 
 
-def _in_metres(courses: Mapping[str, Array]) -> bool:
-    hips = [courses[name] for name in ("left_hip", "right_hip") if name in courses]
+def _in_metres(tracks: Mapping[str, Array]) -> bool:
+    hips = [tracks[name] for name in ("left_hip", "right_hip") if name in tracks]
     if len(hips) < 2:
         return False
     middle = 0.5 * (hips[0] + hips[1])[:, :2]
@@ -309,11 +309,11 @@ def _in_metres(courses: Mapping[str, Array]) -> bool:
 
 def _normalised(groups: Sequence[Mapping[str, Array]]) -> bool:
     """Whether most landmarks lie where an image whose sides are 1 has them."""
-    values = np.concatenate([c[:, :2].ravel() for courses in groups for c in courses.values()])
+    values = np.concatenate([c[:, :2].ravel() for tracks in groups for c in tracks.values()])
     values = np.abs(values[np.isfinite(values)])
     return len(values) > 0 and float(np.median(values)) < 2.0
 
 
-def _stretched(courses: Mapping[str, Array]) -> dict[str, Array]:
+def _stretched(tracks: Mapping[str, Array]) -> dict[str, Array]:
     factors = np.array([USUAL_ASPECT, 1.0, USUAL_ASPECT, 1.0])
-    return {name: found * factors for name, found in courses.items()}
+    return {name: found * factors for name, found in tracks.items()}

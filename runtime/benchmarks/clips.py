@@ -13,7 +13,7 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
-from devices.builtin.motions import ACTS
+from devices.builtin.motions import MOTIONS
 from replay.builtin import builtin_recording
 from replay.formats import read_recording
 from replay.player import EveryFrame, Player
@@ -43,7 +43,7 @@ def run(
         character: meshes or names; the built-in characters where None.
     """
     clips = [(path.name, read_recording(path)) for path in recording or ()]
-    clips = clips or [(act, builtin_recording(act)) for act in ACTS]
+    clips = clips or [(act, builtin_recording(act)) for act in MOTIONS]
     cast = [(name, load_character(name)) for name in character or BUILTIN]
     print(f"clips: worst of {len(cast)} characters; no tick may take {FRAME_MS:g} ms")
     print(

@@ -14,10 +14,10 @@ from pathlib import Path
 
 import numpy as np
 
-from devices.builtin.motions import performance
+from devices.builtin.motions import motion_clip
 from devices.builtin.simulator import Simulator
 from devices.skeleton import SkeletonFrame
-from replay.mcap.file import McapReader
+from replay.mcap.reader import McapReader
 from replay.recorded_stream import RecordedStream
 from replay.recorder import Recorder
 from runtime.show.clock import Ticker
@@ -93,7 +93,7 @@ def killed_recording(path: Path, seconds: float) -> Killed:
 
 def _record_for_ever(path: Path) -> None:
     """Record simulated performers to `path` and tell standard output of each frame that came."""
-    stream = Simulator(performance("show"), performers=PERFORMERS)
+    stream = Simulator(motion_clip("show"), performers=PERFORMERS)
     recorder = Recorder(path, stream.skeleton, tell=warn)
 
     def keep(frame: SkeletonFrame) -> None:

@@ -13,8 +13,8 @@ from contextlib import ExitStack
 
 import numpy as np
 
-from devices.builtin.motions import performance
-from devices.builtin.performance import RATE, Performance
+from devices.builtin.gestures import RATE, MotionClip
+from devices.builtin.motions import motion_clip
 from devices.skeleton import SkeletonFrame
 from runtime.driving.performer import Performer
 from runtime.output.live.bridge_publisher import BridgePublisher, binding
@@ -31,7 +31,7 @@ Send = Callable[[SkeletonFrame], None]
 def main(arguments: list[str]) -> None:
     """Send COUNT frames at RATE a second by WAY: ``zmq``, or ``vmc`` to PORT."""
     way, rate, count = arguments[0], float(arguments[1]), int(arguments[2])
-    played = performance(ACT)
+    played = motion_clip(ACT)
     with ExitStack() as closing:
         send = (
             _by_bridge(played, closing)
@@ -43,7 +43,7 @@ def main(arguments: list[str]) -> None:
         sys.stdin.read()
 
 
-def _send_all(played: Performance, send: Send, rate: float, count: int) -> None:
+def _send_all(played: MotionClip, send: Send, rate: float, count: int) -> None:
     """Send `count` frames; the performance goes by as fast at every rate."""
     ticker = Ticker(rate)
     for number in range(count):
@@ -59,7 +59,7 @@ def _send_all(played: Performance, send: Send, rate: float, count: int) -> None:
         )
 
 
-def _by_bridge(played: Performance, closing: ExitStack) -> Send:
+def _by_bridge(played: MotionClip, closing: ExitStack) -> Send:
     where = binding("tcp://127.0.0.1:*", None, option="keys")
     publisher = BridgePublisher(where, played.skeleton, tell=lambda _: None)
     closing.enter_context(publisher)
@@ -67,7 +67,7 @@ def _by_bridge(played: Performance, closing: ExitStack) -> Send:
     return publisher.write
 
 
-def _by_vmc(played: Performance, port: int, closing: ExitStack) -> Send:
+def _by_vmc(played: MotionClip, port: int, closing: ExitStack) -> Send:
     performer = Performer(played.skeleton)
     sender = closing.enter_context(VmcPerformer(performer, "127.0.0.1", port))
 

@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.builtin.motions import performance
-from devices.builtin.performance import RATE
+from devices.builtin.gestures import RATE
+from devices.builtin.motions import motion_clip
 from devices.builtin.simulator import Simulator
 from devices.skeleton import SkeletonFrame
-from replay.mcap.file import McapReader
+from replay.mcap.reader import McapReader
 from replay.recorded_stream import Keep, RecordedStream
 from replay.recorder import WAITING, Recorder
 from runtime.benchmarks.memory import resident_memory
@@ -131,7 +131,7 @@ def soaked(path: Path, seconds: float, *, real_time: bool) -> Soak:
     ticks = max(int(seconds * RATE), 1)
     clock = _ShowClock()
     stream = Simulator(
-        performance("show"), time.perf_counter if real_time else clock, performers=PERFORMERS
+        motion_clip("show"), time.perf_counter if real_time else clock, performers=PERFORMERS
     )
     # Filled, not only claimed, so that their own memory does not grow.
     spent, work, stolen = np.full((3, ticks), np.nan, np.float32)

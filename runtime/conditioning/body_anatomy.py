@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.bodies.anatomy import Kind, Side, label_joints
+from devices.bodies.joint_labels import label_joints
+from devices.bodies.joint_names import Kind, Side
 from devices.skeleton import Skeleton
 
 Array = NDArray[np.float64]

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.bodies.anatomy import Kind, Side, first_of, label_joints
+from devices.bodies.joint_labels import first_of, label_joints
+from devices.bodies.joint_names import Kind, Side
 from devices.skeleton import Skeleton
 from solvers.kernels.compiled import kernel
 from solvers.signal.continuity import distance

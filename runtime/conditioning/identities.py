@@ -15,7 +15,7 @@ from itertools import groupby
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.bodies.anatomy import hips_joint
+from devices.bodies.joint_labels import hips_joint
 from devices.skeleton import Skeleton, SkeletonFrame
 from solvers.signal.association import associate
 

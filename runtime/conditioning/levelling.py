@@ -1,7 +1,7 @@
 """The floor brought to y = 0, by where the feet have stood.
 
 Devices that see the floor themselves, or feel how they are tilted, have levelled their frames
-already (`devices.bodies.floor_level`); then there is little left to do here.
+already (`devices.bodies.camera_level`); then there is little left to do here.
 """
 
 from __future__ import annotations

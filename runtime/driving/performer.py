@@ -7,15 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.bodies.anatomy import (
-    available_presets,
-    heading_joints,
-    hips_joint,
-    label_joints,
-    source_joints,
-    source_tree,
-)
+from devices.bodies.joint_labels import heading_joints, hips_joint, label_joints
 from devices.bodies.joint_names import Kind
+from devices.bodies.source_joints import available_presets, source_joints, source_tree
 from devices.skeleton import Skeleton, SkeletonFrame
 from runtime.conditioning.conditioner import Conditioner, warm
 from runtime.conditioning.mirror import mirrored

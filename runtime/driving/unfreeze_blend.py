@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from devices.bodies.anatomy import hips_joint
+from devices.bodies.joint_labels import hips_joint
 from devices.skeleton import Skeleton
 from runtime.driving.performer import Pose, Rest
 from solvers.retarget.heading import turned

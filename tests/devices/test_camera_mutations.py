@@ -21,8 +21,8 @@ from devices.kinect import azure as kinect_azure
 from devices.kinect import v1 as kinect_v1
 from devices.kinect import v2 as kinect_v2
 from devices.kinect.bodies import KinectDecoder
-from devices.leap.leapc import LeapCDecoder
-from devices.leap.messages import LeapDecoder
+from devices.leap.sdk import LeapCDecoder
+from devices.leap.websocket_messages import LeapDecoder
 from devices.mediapipe.landmark_messages import LandmarkDecoder
 from devices.skeleton import SkeletonFrame
 from devices.transport.senders import Decoder

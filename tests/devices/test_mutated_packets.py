@@ -20,11 +20,11 @@ from devices.osc.nimate import NimateDecoder
 from devices.osc.openni_joints import OPENNI
 from devices.osc.vmc import PERFORMER, VmcDecoder
 from devices.osc.vrchat import VrchatDecoder
-from devices.studio.rokoko import RokokoDecoder
-from devices.studio.xsens import XsensDecoder
-from devices.studio.xsens_segments import xsens_skeleton
+from devices.suits.rokoko import RokokoDecoder
+from devices.suits.xsens import XsensDecoder
+from devices.suits.xsens_segments import xsens_skeleton
 from devices.transport.senders import Decoder
-from tests.devices import studio_senders as studio
+from tests.devices import sender_packets as studio
 from tests.devices.vmc_sender import at, bones, bundle, message, ok, root, slime
 
 MUTATIONS = int(os.environ.get("BUNRAKU_MUTATIONS", "3000"))

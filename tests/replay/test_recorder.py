@@ -14,12 +14,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from devices.builtin.motions import performance
-from devices.builtin.performance import RATE
+from devices.builtin.gestures import RATE
+from devices.builtin.motions import motion_clip
 from devices.errors import InputError
 from devices.skeleton import Skeleton, SkeletonFrame
 from devices.transport.live_stream import Deliver, LiveStream
-from replay.mcap.file import McapReader, read_mcap
+from replay.mcap.reader import McapReader, read_mcap
 from replay.mcap.writer import McapWriter
 from replay.player import EveryFrame, Player
 from replay.recorded_stream import RecordedStream
@@ -226,7 +226,7 @@ sys.exit(main(["replay", sys.argv[1], "--character", "paper", "--headless", "--f
 
 @pytest.mark.skipif(sys.platform == "win32", reason="limits of a process are POSIX")
 def test_a_full_disk_is_told_in_the_running_show_which_goes_on(tmp_path: Path) -> None:
-    played = performance("wave")
+    played = motion_clip("wave")
     with McapWriter(tmp_path / "in.mcap", played.skeleton) as writer:
         for index, positions in enumerate(played.positions):
             seen = np.ones(len(positions))

@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
-from devices.builtin.puppet_body import puppet_skeleton
+from devices.builtin.body import builtin_skeleton
 from devices.skeleton import Skeleton, SkeletonFrame
 from replay.recording import Recording
 from runtime.characters.character import Character, Material, Surface
 from runtime.driving.mapping import Drive
 from solvers.retarget.heading import turned
 
-BODY = puppet_skeleton()
+BODY = builtin_skeleton()
 HIPS = BODY.index("SpineBase")
 BRICK = 0.08  # [m]
 FRONT_VIEW = np.eye(3)

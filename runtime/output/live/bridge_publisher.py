@@ -17,7 +17,7 @@ import zmq
 from zmq.auth.thread import ThreadAuthenticator
 from zmq.utils import z85
 
-from devices.bridge.keys import BridgeKeys, check_guarded, read_bridge_keys
+from devices.bridge.keys import PublisherKeys, check_guarded, read_publisher_keys
 from devices.bridge.messages import VERSION
 from devices.bridge.socket import (
     DOMAIN,
@@ -46,7 +46,7 @@ class BoundEndpoint:
     """Where a bridge listens and who may come: `keys` is None on this machine only."""
 
     endpoint: str
-    keys: BridgeKeys | None
+    keys: PublisherKeys | None
 
 
 def binding(bind: str, keys: Path | None, *, option: str) -> BoundEndpoint:
@@ -69,7 +69,7 @@ def binding(bind: str, keys: Path | None, *, option: str) -> BoundEndpoint:
     everywhere = {"0.0.0.0": "*", "localhost": "127.0.0.1"}
     return BoundEndpoint(
         tcp_endpoint(everywhere.get(host, host), port or "*"),
-        None if keys is None else read_bridge_keys(keys),
+        None if keys is None else read_publisher_keys(keys),
     )
 
 
@@ -232,7 +232,7 @@ class _Door:
     """Lets in whose key is allowed; there is none to pass where there are no keys."""
 
     def __init__(
-        self, context: Context, keys: BridgeKeys | None, tell: Callable[[str], None]
+        self, context: Context, keys: PublisherKeys | None, tell: Callable[[str], None]
     ) -> None:
         self._keys = keys
         self._tell = tell

@@ -1,6 +1,6 @@
 """What one stage of a bridge is still owed: the newest frame of each performer, or every frame.
 
-Both keep to the stage's window: as many frames are under way at once as it has room for, and what
+Both keep to the stage's credit: as many frames are under way at once as it has room for, and what
 it has not told of having received counts as under way. So a slow network or a stage that stands
 still holds back what is sent instead of filling queues with what is past.
 """
@@ -48,8 +48,8 @@ class BridgeQueue(Protocol):
         """Note that what was under way is gone, after `sequence` has arrived."""
         ...
 
-    def draw(self, window: int) -> Parcel | None:
-        """The next frame to send, if there is one and fewer than `window` are under way."""
+    def draw(self, credit: int) -> Parcel | None:
+        """The next frame to send, if there is one and fewer than `credit` are under way."""
         ...
 
     @property
@@ -87,9 +87,9 @@ class LatestQueue:
         del sequence
         self._flying.clear()
 
-    def draw(self, window: int) -> Parcel | None:
+    def draw(self, credit: int) -> Parcel | None:
         """The oldest of the newest frames, so that sequence numbers rise."""
-        if not self._waiting or len(self._flying) >= window:
+        if not self._waiting or len(self._flying) >= credit:
             return None
         parcel = self._waiting.pop(next(iter(self._waiting)))
         self._flying.append(parcel.sequence)
@@ -133,9 +133,9 @@ class LosslessQueue:
         self._flying.clear()
         self.sent = min(self.sent, sequence)
 
-    def draw(self, window: int) -> Parcel | None:
+    def draw(self, credit: int) -> Parcel | None:
         """The oldest frame that has not gone out."""
-        if not self._waiting or len(self._flying) >= window:
+        if not self._waiting or len(self._flying) >= credit:
             return None
         parcel = self._waiting.popleft()
         self._flying.append(parcel)

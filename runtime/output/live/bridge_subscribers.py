@@ -39,7 +39,7 @@ class _Stage:
     heard_at: float
     latest: bool
     queue: BridgeQueue
-    window: int = 0
+    credit: int = 0
 
     def gone(self, now: float) -> bool:
         return now - self.heard_at > GONE[self.latest]
@@ -112,7 +112,7 @@ class BridgeAudience:
     def due(self) -> Iterator[tuple[bytes, bytes]]:
         """Connection and bytes of each message that should go out now."""
         for stage in self._stages.values():
-            while (parcel := stage.queue.draw(stage.window)) is not None:
+            while (parcel := stage.queue.draw(stage.credit)) is not None:
                 self.sent += 1
                 yield stage.route, parcel.data
 
@@ -141,7 +141,7 @@ class BridgeAudience:
             stage.route = route
             stage.queue.reconnect(call.received)
         stage.queue.received(call.received)
-        stage.heard_at, stage.window = heard_at, call.window
+        stage.heard_at, stage.credit = heard_at, call.credit
         answer = Answer(
             self._session, stage.queue.sent, call.called_at, heard_at, answered_at=self._clock()
         )

@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.bodies.anatomy import label_joints
 from devices.bodies.forward_kinematics import conjugate, multiply, rotate
 from devices.bodies.humanoid import FINGERS, SEGMENTS, SIDES, humanoid_skeleton
+from devices.bodies.joint_labels import label_joints
 from devices.bodies.joint_names import BodyPart, Kind, Side
 from devices.errors import InputError
 from devices.skeleton import Skeleton

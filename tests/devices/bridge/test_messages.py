@@ -31,12 +31,12 @@ from devices.bridge.messages import (
     encode_call,
     encode_sample,
 )
-from devices.builtin.puppet_body import puppet_skeleton
+from devices.builtin.body import builtin_skeleton
 from devices.errors import InputError
 from devices.skeleton import Skeleton, SkeletonFrame
 
 MUTATIONS = int(os.environ.get("BUNRAKU_MUTATIONS", "10000"))
-BODY = puppet_skeleton()
+BODY = builtin_skeleton()
 U64 = st.integers(0, 2**64 - 1)
 TIMES = st.floats(-1e9, 1e9)
 
@@ -66,7 +66,7 @@ def sample_of(data: bytes) -> Sample:
         session=U64,
         received=U64,
         called_at=TIMES,
-        window=st.integers(0, 4096),
+        credit=st.integers(0, 4096),
         mode=st.sampled_from((LATEST, LOSSLESS, LEAVING)),
     )
 )

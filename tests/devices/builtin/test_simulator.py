@@ -7,24 +7,24 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import devices.builtin.simulator
-from devices.builtin.motions import ACTS, performance
-from devices.builtin.performance import RATE, BuiltinMotion, Gesture, Performance, played, swing
-from devices.builtin.puppet_body import FINGERS, SIDES, finger_joints, puppet_skeleton
+from devices.builtin.body import FINGERS, SIDES, builtin_skeleton, finger_joints
+from devices.builtin.gestures import RATE, BuiltinMotion, Gesture, MotionClip, sample_motion, swing
+from devices.builtin.motions import MOTIONS, motion_clip
 from devices.errors import InputError
 from devices.stream import open_stream
 from replay.builtin import builtin_recording
 
 
-@pytest.fixture(scope="module", params=ACTS)
-def act(request: pytest.FixtureRequest) -> Performance:
-    return performance(request.param)
+@pytest.fixture(scope="module", params=MOTIONS)
+def act(request: pytest.FixtureRequest) -> MotionClip:
+    return motion_clip(request.param)
 
 
 def looped(values: np.ndarray, times: int = 3) -> np.ndarray:
     return np.concatenate([values, values[:times]])
 
 
-def test_bones_keep_their_length(act: Performance) -> None:
+def test_bones_keep_their_length(act: MotionClip) -> None:
     parents = act.skeleton.parents
     child = np.flatnonzero(parents >= 0)
     rest = act.skeleton.rest_positions
@@ -33,7 +33,7 @@ def test_bones_keep_their_length(act: Performance) -> None:
     assert np.abs(lengths - expected).max() < 1e-9
 
 
-def test_rotations_carry_the_rest_bones_to_where_the_joints_are(act: Performance) -> None:
+def test_rotations_carry_the_rest_bones_to_where_the_joints_are(act: MotionClip) -> None:
     rest, parents = act.skeleton.rest_positions, act.skeleton.parents
     for joint in np.flatnonzero(parents >= 0):
         bone = rest[joint] - rest[parents[joint]]
@@ -42,7 +42,7 @@ def test_rotations_carry_the_rest_bones_to_where_the_joints_are(act: Performance
         assert np.abs(seen - turned).max() < 1e-9
 
 
-def test_the_motion_has_no_jump_nor_jolt_and_loops(act: Performance) -> None:
+def test_the_motion_has_no_jump_nor_jolt_and_loops(act: MotionClip) -> None:
     velocity = np.diff(looped(act.positions), axis=0) * RATE
     acceleration = np.diff(velocity, axis=0) * RATE
     assert np.linalg.norm(velocity, axis=2).max() < 7.0
@@ -51,7 +51,7 @@ def test_the_motion_has_no_jump_nor_jolt_and_loops(act: Performance) -> None:
     assert seam < 0.005
 
 
-def test_it_starts_at_rest_with_open_arms(act: Performance) -> None:
+def test_it_starts_at_rest_with_open_arms(act: MotionClip) -> None:
     assert np.abs(act.positions[0] - act.skeleton.rest_positions).max() < 0.05
     skeleton = act.skeleton
     for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
@@ -61,7 +61,7 @@ def test_it_starts_at_rest_with_open_arms(act: Performance) -> None:
         assert 35.0 < angle < 55.0
 
 
-def test_a_foot_stays_on_the_floor(act: Performance) -> None:
+def test_a_foot_stays_on_the_floor(act: MotionClip) -> None:
     feet = [act.skeleton.index(f"Foot{side}") for side in SIDES]
     lowest = act.positions[:, feet, 1].min(axis=1)
     assert lowest.min() > 0.0
@@ -71,7 +71,7 @@ def test_a_foot_stays_on_the_floor(act: Performance) -> None:
 
 def test_each_act_moves_what_it_is_named_after() -> None:
     def travel(name: str, joint: str) -> float:
-        act = performance(name)
+        act = motion_clip(name)
         path = act.positions[:, act.skeleton.index(joint)]
         return float(np.ptp(path, axis=0).max())
 
@@ -80,7 +80,7 @@ def test_each_act_moves_what_it_is_named_after() -> None:
     assert min(travel("arms", f"Hand{side}") for side in SIDES) > 0.8
     assert min(travel("walk", f"Knee{side}") for side in SIDES) > 0.25
     assert travel("bow", "Head") > 0.4
-    played_fingers = performance("fingers")
+    played_fingers = motion_clip("fingers")
     for side in SIDES:
         hand = played_fingers.skeleton.index(f"Hand{side}")
         for finger in FINGERS:
@@ -92,7 +92,7 @@ def test_each_act_moves_what_it_is_named_after() -> None:
 
 
 def test_the_body_is_symmetric_and_left_is_plus_x() -> None:
-    skeleton = puppet_skeleton()
+    skeleton = builtin_skeleton()
     for joint, name in enumerate(skeleton.names):
         if "Left" in name:
             other = skeleton.index(name.replace("Left", "Right"))
@@ -114,7 +114,7 @@ def test_a_gesture_eases_with_continuous_acceleration() -> None:
 
 def test_what_outlasts_the_act_goes_on_at_its_beginning() -> None:
     late = Gesture("Neck", (0.5, 0.0, 0.0), begin=0.6, end=0.9, ease=0.4)
-    frames = played(BuiltinMotion(1.0, (late,)))
+    frames = sample_motion(BuiltinMotion(1.0, (late,)))
     head = frames.positions[:, frames.skeleton.index("Head")]
     assert np.abs(head[0] - frames.skeleton.rest_positions[frames.skeleton.index("Head")]).max() > 0
     assert np.linalg.norm(head[0] - head[-1]) < 0.02
@@ -129,7 +129,7 @@ class Clock:
 
 def test_the_stream_gives_each_frame_once_and_in_time() -> None:
     clock = Clock()
-    stream = devices.builtin.simulator.Simulator(performance("wave"), clock)
+    stream = devices.builtin.simulator.Simulator(motion_clip("wave"), clock)
     frames = []
     for _ in range(100):
         frames += stream.poll()
@@ -140,13 +140,13 @@ def test_the_stream_gives_each_frame_once_and_in_time() -> None:
     assert times[0] == 100.0
     assert all(frame.time <= frame.arrival + 1e-6 for frame in frames)
     assert not stream.ended
-    first = performance("wave").positions[0]
+    first = motion_clip("wave").positions[0]
     assert np.array_equal(frames[0].positions, first)
 
 
 def test_the_stream_loops_and_forgets_a_long_absence() -> None:
     clock = Clock()
-    act = performance("bow")
+    act = motion_clip("bow")
     stream = devices.builtin.simulator.Simulator(act, clock)
     stream.poll()
     clock.now += len(act.times) / RATE
@@ -171,7 +171,7 @@ def test_addresses_open_the_acts() -> None:
 
 def test_the_recording_is_the_same_performance() -> None:
     recording = builtin_recording()
-    act = performance("show")
+    act = motion_clip("show")
     assert 12.0 < recording.seconds < 18.0
     assert np.array_equal(recording.positions, act.positions)
     assert recording.rotations is not None
@@ -183,7 +183,7 @@ def test_the_recording_is_the_same_performance() -> None:
 
 def test_several_performers_stand_side_by_side_at_the_same_times() -> None:
     now = [100.0]
-    act = performance("wave")
+    act = motion_clip("wave")
     with devices.builtin.simulator.Simulator(act, lambda: now[0], performers=4) as stream:
         stream.poll()
         now[0] += 1.0

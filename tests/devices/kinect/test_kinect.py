@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from devices.bodies.body_numbers import BodyNumbers
-from devices.bodies.floor_level import FloorLevel
+from devices.bodies.camera_level import CameraLevel
+from devices.bodies.performer_numbers import PerformerNumbers
 from devices.errors import InputError
 from devices.kinect import azure as kinect_azure
 from devices.kinect import v1 as kinect_v1
@@ -24,9 +24,9 @@ from devices.kinect.bodies import KinectDecoder, Sensor
 from devices.kinect.joints import KINECT_AZURE, KINECT_V1, KINECT_V2
 from devices.kinect.v1 import KinectV1
 from devices.kinect.v2 import KinectV2
-from devices.leap import leapc
+from devices.leap import sdk as leap_sdk
 from devices.leap.joints import SIDES, leap_to_world
-from devices.leap.leapc import LeapC, LeapCDecoder
+from devices.leap.sdk import LeapC, LeapCDecoder
 from devices.skeleton import SkeletonFrame
 from devices.stream import open_stream
 from devices.transport import sdk_library
@@ -89,12 +89,12 @@ def until(condition: Callable[[], bool]) -> bool:
         (kinect_azure.DeviceConfiguration, 36),
         (kinect_azure.TrackerConfiguration, 24),
         (kinect_azure.ImuSample, 48),
-        (leapc.Bone, 44),
-        (leapc.Digit, 184),
-        (leapc.Palm, 80),
-        (leapc.LeapHand, 1084),
-        (leapc.TrackingEvent, 48),
-        (leapc.Message, 20),
+        (leap_sdk.Bone, 44),
+        (leap_sdk.Digit, 184),
+        (leap_sdk.Palm, 80),
+        (leap_sdk.LeapHand, 1084),
+        (leap_sdk.TrackingEvent, 48),
+        (leap_sdk.Message, 20),
     ],
 )
 def test_structures_have_the_sizes_that_the_makers_state(
@@ -195,7 +195,7 @@ def test_slots_are_no_identities() -> None:
 
 
 def test_who_comes_back_with_another_id_has_the_same_number() -> None:
-    numbers = BodyNumbers()
+    numbers = PerformerNumbers()
     here, there = np.array([0.0, 1.0, -2.0]), np.array([1.5, 1.0, -2.0])
     assert numbers({11: here, 22: there}) == {11: 0, 22: 1}
     assert numbers({}) == {}
@@ -205,7 +205,7 @@ def test_who_comes_back_with_another_id_has_the_same_number() -> None:
 
 
 def test_numbers_stay_small_however_many_ids_come() -> None:
-    numbers = BodyNumbers()
+    numbers = PerformerNumbers()
     rng = np.random.default_rng(3)
     for body in range(2000):
         assert (
@@ -257,7 +257,7 @@ def test_an_accelerometer_levels_and_feet_find_the_floor() -> None:
 
 
 def test_the_level_is_steady_and_follows_a_camera_that_is_moved() -> None:
-    level, rng = FloorLevel(), np.random.default_rng(2)
+    level, rng = CameraLevel(), np.random.default_rng(2)
     for _ in range(300):
         noisy = np.array([0.0, 1.0, 0.0]) + rng.normal(scale=0.02, size=3)
         level.learn(noisy / np.linalg.norm(noisy), 1.0 + rng.normal(scale=0.02))
@@ -273,7 +273,7 @@ def test_the_level_is_steady_and_follows_a_camera_that_is_moved() -> None:
     "up", [(0, 0, 0), (np.nan, 1, 0), (1, 0, 0), (0, -1, 0), (0, np.inf, 0), (0, 50, 0)]
 )
 def test_what_cannot_be_a_floor_is_passed_over(up: Sequence[float]) -> None:
-    level = FloorLevel()
+    level = CameraLevel()
     level.learn(np.array(up, dtype=float), 1.3)
     np.testing.assert_array_equal(level.turn, np.eye(3))
     assert level.height == 1.0
@@ -464,7 +464,7 @@ def test_an_address_that_cannot_be_opened_is_one_clear_line(url: str, says: str)
 @pytest.fixture(autouse=True)
 def _no_makers_library(monkeypatch: pytest.MonkeyPatch) -> None:
     """Should a maker's library be installed where the tests run, they must not open it."""
-    for module in (kinect_v1, kinect_v2, kinect_azure, leapc):
+    for module in (kinect_v1, kinect_v2, kinect_azure, leap_sdk):
         monkeypatch.setattr(module, "LIBRARIES", ("no-such-library",))
 
 

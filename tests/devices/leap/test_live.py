@@ -20,9 +20,9 @@ from devices.errors import InputError
 from devices.leap import websocket as leap_websocket
 from devices.leap.hands import leap_frame
 from devices.leap.joints import FINGERS, SIDES, chest, leap_to_world
-from devices.leap.messages import LeapDecoder
 from devices.leap.performer import HandSides
 from devices.leap.websocket import open_device
+from devices.leap.websocket_messages import LeapDecoder
 from devices.skeleton import SkeletonFrame
 from devices.stream import open_stream
 from devices.transport.live_stream import LiveStream

@@ -11,7 +11,7 @@ from pythonosc.osc_message import OscMessage
 from pythonosc.udp_client import SimpleUDPClient
 from scipy.spatial.transform import Rotation
 
-from devices.bodies.anatomy import available_presets
+from devices.bodies.source_joints import available_presets
 from devices.errors import InputError
 from devices.kinect.joints import KINECT_V2
 from devices.osc.nimate import FORMATS, INFERRED, MOST_USERS, NimateDecoder
@@ -19,7 +19,7 @@ from devices.osc.openni_joints import OPENNI, joint_called
 from devices.skeleton import SkeletonFrame
 from devices.stream import open_stream
 from devices.transport.live_stream import LiveStream
-from tests.devices.studio_senders import (
+from tests.devices.sender_packets import (
     NIMATE,
     STEP,
     SYNC,

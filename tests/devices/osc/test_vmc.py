@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from devices.bodies.anatomy import available_presets, source_joints
 from devices.bodies.humanoid import FINGERS, SEGMENTS, SIDES, humanoid_skeleton
 from devices.bodies.humanoid_kernels import INFERRED, UNSURE
+from devices.bodies.source_joints import available_presets, source_joints
 from devices.errors import InputError
 from devices.osc.vmc import PERFORMER, VmcDecoder, bone_of_tracker
 from devices.skeleton import SkeletonFrame

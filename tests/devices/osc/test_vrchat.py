@@ -9,7 +9,7 @@ import pytest
 from pythonosc.osc_message import OscMessage
 from scipy.spatial.transform import Rotation
 
-from devices.bodies.tracker_places import HEAD, JOINTS, places_of, tracker_skeleton
+from devices.bodies.tracker_joints import HEAD, JOINTS, assign_trackers, tracker_skeleton
 from devices.errors import InputError
 from devices.osc.vrchat import GONE, VrchatDecoder
 from devices.skeleton import SkeletonFrame
@@ -141,7 +141,9 @@ def test_other_addresses_are_no_fault(which: str) -> None:
 
 
 def test_a_place_is_never_given_twice() -> None:
-    places = places_of(np.zeros((8, 3)), None, None)
+    places = assign_trackers(np.zeros((8, 3)), None, None)
     assert sorted(places) == PLACES
-    more = places_of(np.zeros((3, 3)), REST[HEAD], np.array([0.0, 0.0, 1.0, 0.0]), taken=[0, 1, 3])
+    more = assign_trackers(
+        np.zeros((3, 3)), REST[HEAD], np.array([0.0, 0.0, 1.0, 0.0]), taken=[0, 1, 3]
+    )
     assert not {0, 1, 3, HEAD} & set(more.tolist())

@@ -19,11 +19,11 @@ import pytest
 from devices.errors import InputError
 from devices.skeleton import SkeletonFrame
 from devices.stream import open_stream
-from devices.studio.xsens import HEADER, XsensDecoder, datagram_length
+from devices.suits.xsens import HEADER, XsensDecoder, datagram_length
 from devices.transport.live_stream import LiveStream
 from devices.transport.senders import MOST_SENDERS
 from devices.transport.tcp import LONGEST, Framing, TcpTransport, take_messages
-from tests.devices.studio_senders import XSENS, mxtp01, mxtp02, mxtp13, posed
+from tests.devices.sender_packets import XSENS, mxtp01, mxtp02, mxtp13, posed
 from tests.devices.test_mutated_packets import MUTATIONS, damaged, xsens_packets
 
 PATIENT = 30.0  # seconds until a test gives up

@@ -12,7 +12,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from devices.bodies.anatomy import Kind, Side, first_of, label_joints
+from devices.bodies.joint_labels import first_of, label_joints
+from devices.bodies.joint_names import Kind, Side
 from devices.errors import InputError
 from replay.bvh.reader import read_bvh, recognises_bvh
 from replay.formats import read_recording

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from devices.builtin.motions import performance
-from devices.builtin.performance import RATE
+from devices.builtin.gestures import RATE
+from devices.builtin.motions import motion_clip
 from devices.errors import InputError
 from devices.skeleton import Skeleton
 from replay.bvh.export import BvhMade, write_bvh_recording
@@ -108,7 +108,7 @@ def assert_places(text: str, of: Recording, unit: str = "cm", atol: float = 1e-6
 
 @pytest.mark.parametrize("unit", UNITS)
 def test_bones_that_keep_their_length_come_back_exactly_in_every_unit(unit: str) -> None:
-    act = performance("show")
+    act = motion_clip("show")
     played = recording(act.skeleton, act.positions[:90], act.rotations[:90])
     text, made = written(played, unit=unit)
     assert_places(text, played, unit, atol=2e-6)
@@ -118,7 +118,7 @@ def test_bones_that_keep_their_length_come_back_exactly_in_every_unit(unit: str)
 
 
 def test_without_rotations_every_joint_is_still_where_it_was() -> None:
-    act = performance("show")
+    act = motion_clip("show")
     played = recording(act.skeleton, act.positions[:90])
     text, _ = written(played)
     assert_places(text, played, atol=1e-4)
@@ -147,7 +147,7 @@ def test_rotations_of_the_source_decide_the_twist() -> None:
 
 
 def test_rotations_that_carry_no_bone_are_left_aside() -> None:
-    act = performance("show")
+    act = motion_clip("show")
     random = Rotation.random(60 * len(act.skeleton.names), rng=np.random.default_rng(0)).as_quat()
     nonsense = random.reshape(60, -1, 4)
     with_them = fit_rigid_bones(act.skeleton, act.positions[:60], nonsense)
@@ -156,7 +156,7 @@ def test_rotations_that_carry_no_bone_are_left_aside() -> None:
 
 
 def test_unknown_rotations_and_joints_leave_no_hole() -> None:
-    act = performance("show")
+    act = motion_clip("show")
     positions, rotations = act.positions[:120].copy(), act.rotations[:120].copy()
     positions[30:60, 5] = np.nan
     rotations[20:50] = np.nan
@@ -169,7 +169,7 @@ def test_unknown_rotations_and_joints_leave_no_hole() -> None:
 
 
 def test_wavering_bones_get_their_median_length() -> None:
-    act = performance("show")
+    act = motion_clip("show")
     noise = np.random.default_rng(1).normal(scale=0.005, size=act.positions[:200].shape)
     played = recording(act.skeleton, act.positions[:200] + noise)
     text, made = written(played)
@@ -215,7 +215,7 @@ def test_jitter_and_gaps_become_even_times_that_keep_the_timing() -> None:
 
 @pytest.mark.parametrize(("rate", "frames"), [(30.0, 46), (120.0, 181), (7.0, 11)])
 def test_a_rate_that_is_asked_for_is_the_files(rate: float, frames: int) -> None:
-    act = performance("show")
+    act = motion_clip("show")
     text, made = written(recording(act.skeleton, act.positions[:91]), rate=rate)
     assert (made.frames, made.step) == (frames, 1 / rate)
     places, step = understood(text)
@@ -241,7 +241,7 @@ def test_even_times_lie_within_and_never_grow_beyond_all_bounds(
 
 
 def test_more_frames_than_a_file_can_hold_are_refused() -> None:
-    act = performance("show")
+    act = motion_clip("show")
     with pytest.raises(InputError, match="too many; ask for a lower rate"):
         written(recording(act.skeleton, act.positions[:91]), rate=1e6)
     with pytest.raises(InputError, match="too many; ask for a lower rate"):
@@ -249,7 +249,7 @@ def test_more_frames_than_a_file_can_hold_are_refused() -> None:
 
 
 def test_one_frame_is_a_file_of_one_frame() -> None:
-    act = performance("show")
+    act = motion_clip("show")
     text, made = written(recording(act.skeleton, act.positions[:1]))
     assert made.frames == 1
     assert "Frames: 1\n" in text

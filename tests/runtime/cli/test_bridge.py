@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 import zmq
 
-from devices.bridge.keys import is_loopback, make_keys, read_bridge_keys, read_stage_keys
+from devices.bridge.keys import is_loopback, make_keys, read_publisher_keys, read_subscriber_keys
 from devices.bridge.messages import (
     LATEST,
     LOSSLESS,
@@ -261,20 +261,20 @@ def test_keys_belong_to_their_owner_and_are_never_replaced(
     assert "no key is replaced" in capsys.readouterr().err
     assert [path.read_bytes() for path in files] == secrets
     capture, stage = (
-        read_bridge_keys(tmp_path / "keys/capture"),
-        read_stage_keys(tmp_path / "keys/stage"),
+        read_publisher_keys(tmp_path / "keys/capture"),
+        read_subscriber_keys(tmp_path / "keys/stage"),
     )
     assert stage.bridge == capture.public
     assert capture.allowed == {stage.public}
     assert len({capture.secret, stage.secret, capture.public, stage.public}) == 4
     (tmp_path / "keys/stage/stage.key_secret").chmod(0o644)
     with pytest.raises(InputError, match=r"stage\.key_secret can be read by others.*chmod 600"):
-        read_stage_keys(tmp_path / "keys/stage")
+        read_subscriber_keys(tmp_path / "keys/stage")
 
 
 def test_keys_that_are_none_are_told(tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"is not there.*--make-keys DIR"):
-        read_stage_keys(tmp_path)
+        read_subscriber_keys(tmp_path)
     make_keys(tmp_path / "keys")
     secret = tmp_path / "keys/stage/stage.key_secret"
     public = (tmp_path / "keys/capture/allowed/stage.key").read_bytes()
@@ -287,13 +287,13 @@ def test_keys_that_are_none_are_told(tmp_path: Path) -> None:
     ):
         secret.write_bytes(damaged)
         with pytest.raises(InputError, match="is no key"):
-            read_stage_keys(tmp_path / "keys/stage")
+            read_subscriber_keys(tmp_path / "keys/stage")
     secret.write_bytes(public)
     with pytest.raises(InputError, match="holds no secret key"):
-        read_stage_keys(tmp_path / "keys/stage")
+        read_subscriber_keys(tmp_path / "keys/stage")
     (tmp_path / "keys/capture/allowed/stage.key").unlink()
     with pytest.raises(InputError, match="none could come in"):
-        read_bridge_keys(tmp_path / "keys/capture")
+        read_publisher_keys(tmp_path / "keys/capture")
 
 
 @pytest.mark.parametrize(

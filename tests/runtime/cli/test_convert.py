@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from devices.builtin.motions import performance
-from devices.builtin.performance import RATE
+from devices.builtin.gestures import RATE
+from devices.builtin.motions import motion_clip
 from devices.skeleton import SkeletonFrame
 from replay.formats import read_recording
 from replay.joint_table import read_joint_table
@@ -22,7 +22,7 @@ FRAMES = 40
 
 def recorded(path: Path, performers: int = 1, rotations: bool = True) -> Path:
     """A native recording of the built-in performers, one joint of whom hides for a while."""
-    act = performance("show")
+    act = motion_clip("show")
     with McapWriter(path, act.skeleton, source=provenance("sim://show")) as writer:
         for number in range(FRAMES):
             for performer in range(performers):

@@ -27,7 +27,7 @@ from runtime.cli import main
 from runtime.cli.devices import PLACES, State, listening_ports, watch
 from runtime.cli.doctor import EXTRAS, udp_queue
 from runtime.render.egl import egl_devices
-from tests.devices.studio_senders import XSENS, bones, mxtp02, packed, posed, rokoko_v3
+from tests.devices.sender_packets import XSENS, bones, mxtp02, packed, posed, rokoko_v3
 from tests.devices.vmc_sender import slime
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -137,7 +137,7 @@ def test_each_place_has_a_state_of_its_own() -> None:
 
 
 def posed_rokoko() -> Any:
-    from devices.studio.rokoko_bones import SKELETON
+    from devices.suits.rokoko_bones import SKELETON
 
     return posed(SKELETON)
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from devices.bridge.inbox import NewestOfEach
+from devices.bridge.frame_queues import LatestFrames
 from devices.builtin.simulator import Simulator
 from devices.skeleton import SkeletonFrame
 from devices.stream import open_stream
@@ -130,8 +130,8 @@ def test_what_can_be_waited_for_is_waited_for() -> None:
         assert isinstance(pace_of(simulated), Ticker)
 
 
-@pytest.mark.parametrize("make", [lambda: Inbox(2), NewestOfEach])
-def test_an_inbox_can_be_waited_for(make: Callable[[], Inbox | NewestOfEach]) -> None:
+@pytest.mark.parametrize("make", [lambda: Inbox(2), LatestFrames])
+def test_an_inbox_can_be_waited_for(make: Callable[[], Inbox | LatestFrames]) -> None:
     inbox = make()
     frame = SkeletonFrame(0.0, np.zeros((1, 3)), None, np.ones(1))
     inbox.put([])

@@ -10,7 +10,7 @@ import pytest
 
 from devices.bridge.messages import LOSSLESS
 from devices.bridge.stream import Bridge, BridgeStream
-from devices.builtin.motions import performance
+from devices.builtin.motions import motion_clip
 from devices.builtin.simulator import Simulator
 from devices.skeleton import SkeletonFrame
 from devices.stream import SkeletonStream
@@ -114,7 +114,7 @@ def test_a_second_stage_has_both_performers_as_the_first_has_them(
     publisher: BridgePublisher,
 ) -> None:
     now = [time.perf_counter()]
-    stream = Simulator(performance("wave"), lambda: now[0], performers=2)
+    stream = Simulator(motion_clip("wave"), lambda: now[0], performers=2)
     acts = two_acts(for_live())
     performers = [act.performer for act in acts]
     output = BridgePerformer(performers, publisher, clock=lambda: now[0])

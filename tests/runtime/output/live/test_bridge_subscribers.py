@@ -20,8 +20,8 @@ from devices.bridge.messages import (
     encode_sample,
 )
 from devices.bridge.messages import Answer as AnswerMessage
-from devices.bridge.receiver import BEAT, WINDOW, BridgeReceiver
-from devices.builtin.puppet_body import puppet_skeleton
+from devices.bridge.receiver import BEAT, CREDIT, BridgeReceiver
+from devices.builtin.body import builtin_skeleton
 from devices.skeleton import Skeleton, SkeletonFrame
 from runtime.output.live.bridge_queue import LosslessQueue, Parcel
 from runtime.output.live.bridge_subscribers import GONE, MOST_STAGES, BridgeAudience
@@ -60,8 +60,8 @@ class Wire:
         self.audience = BridgeAudience(BODY, lambda: self.now + self.offset)
         return self.audience
 
-    def call(self, held_back: int = 0) -> None:
-        data = self.receiver.call(self.now, held_back)
+    def call(self, waiting: int = 0) -> None:
+        data = self.receiver.call(self.now, waiting)
         self.now += self.there
         self.under_way += self.audience.hear(self.route, data)
         self.load()
@@ -141,17 +141,17 @@ def test_the_latest_wins_for_each_performer_where_the_way_is_slow() -> None:
     wire.exchange()
     wire.call()
     wire.deliver()
-    window = WINDOW[LATEST]
+    credit = CREDIT[LATEST]
     for number in range(1, 501):
         wire.audience.publish(frame(number, performer=number % 2))
         wire.load()
     first = wire.deliver()
-    assert [number_of(one) for one in first] == list(range(1, window + 1)), "as many as fit"
+    assert [number_of(one) for one in first] == list(range(1, credit + 1)), "as many as fit"
     wire.call()
     newest = wire.deliver()
     assert [number_of(one) for one in newest] == [499, 500], "then the newest of each"
     assert [one.performer for one in newest] == [1, 0]
-    assert wire.receiver.lost == 500 - window - 2
+    assert wire.receiver.lost == 500 - credit - 2
     assert wire.audience.lost == 0, "nobody was owed them"
 
 
@@ -167,9 +167,9 @@ def test_nothing_is_lost_where_nothing_may_be() -> None:
         for _ in range(min(rng.randint(0, 400), 10_000 - published)):
             published += 1
             wire.audience.publish(frame(published))
-        wire.call(held_back=len(inbox))
+        wire.call(waiting=len(inbox))
         inbox += wire.deliver()
-        assert len(inbox) <= WINDOW[LOSSLESS], "no more comes than there is room for"
+        assert len(inbox) <= CREDIT[LOSSLESS], "no more comes than there is room for"
         if rng.random() < 0.2:
             taken += [number_of(one) for one in inbox]
             inbox.clear()
@@ -240,7 +240,7 @@ def test_a_bridge_that_starts_anew_goes_on_with_the_show() -> None:
 def test_another_skeleton_is_refused_and_told() -> None:
     wire = Wire(LATEST)
     wire.exchange()
-    wire.audience = BridgeAudience(puppet_skeleton(), lambda: wire.now)
+    wire.audience = BridgeAudience(builtin_skeleton(), lambda: wire.now)
     wire.exchange()
     assert wire.receiver.strange
     wire.audience.publish(frame(1))
@@ -258,7 +258,7 @@ def test_frames_of_a_bridge_that_is_gone_are_refused() -> None:
     stray = encode_sample(12345, 7, frame(7))
     assert wire.receiver.feed(stray, wire.now) == []
     assert wire.receiver.refused == 1
-    assert wire.receiver.feed(encode_announcement(12345, puppet_skeleton()), wire.now) == []
+    assert wire.receiver.feed(encode_announcement(12345, builtin_skeleton()), wire.now) == []
     assert not wire.receiver.strange
     assert BridgeReceiver(LATEST).feed(stray, 0.0) == [], "nor any before the first word"
 
@@ -284,7 +284,7 @@ def test_a_stage_calls_in_a_steady_beat_and_before_it_runs_dry() -> None:
     wire.call()
     assert not wire.receiver.call_due(wire.now + BEAT * 0.9)
     assert wire.receiver.call_due(wire.now + BEAT)
-    for number in range(1, WINDOW[LOSSLESS] // 4):
+    for number in range(1, CREDIT[LOSSLESS] // 4):
         wire.audience.publish(frame(number))
     wire.load()
     wire.deliver()
@@ -293,7 +293,7 @@ def test_a_stage_calls_in_a_steady_beat_and_before_it_runs_dry() -> None:
     wire.load()
     wire.deliver()
     assert wire.receiver.call_due(wire.now)
-    assert not wire.receiver.call_due(wire.now, held_back=1), "there is no room for more"
+    assert not wire.receiver.call_due(wire.now, waiting=1), "there is no room for more"
 
 
 def test_silent_stages_are_forgotten_and_places_are_few() -> None:
@@ -332,14 +332,14 @@ def test_a_full_buffer_drops_the_oldest_and_counts() -> None:
     for number in range(1, 101):
         queue.offer(Parcel(number, 0, bytes(100)))
     assert queue.dropped == 90
-    drawn = [queue.draw(window=4) for _ in range(5)]
+    drawn = [queue.draw(credit=4) for _ in range(5)]
     assert [one.sequence for one in drawn if one] == [91, 92, 93, 94]
     queue.received(92)
     queue.offer(Parcel(101, 0, bytes(100)))
     queue.offer(Parcel(102, 0, bytes(100)))
     assert queue.dropped == 90, "what has arrived made room"
     queue.reconnect(93)
-    rest = [one.sequence for _ in range(20) if (one := queue.draw(window=50))]
+    rest = [one.sequence for _ in range(20) if (one := queue.draw(credit=50))]
     assert rest == list(range(94, 103))
     assert not queue.empty
     queue.received(102)

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from devices.bodies.forward_kinematics import ForwardKinematics
 from devices.bodies.humanoid import humanoid_skeleton
-from devices.builtin.motions import performance
+from devices.builtin.motions import motion_clip
 from devices.errors import InputError
 from devices.kinect.joints import KINECT_AZURE, KINECT_V1, KINECT_V2
 from devices.mediapipe.joints import (
@@ -58,7 +58,7 @@ def datagrams(marionette: socket.socket) -> list[bytes]:
 
 
 def test_what_is_sent_is_what_is_received(marionette: socket.socket) -> None:
-    act = performance("show")
+    act = motion_clip("show")
     performer = Performer(act.skeleton)
     bones = HumanoidBones(act.skeleton)
     joints = [HUMAN.index(name) for name in bones.names]
@@ -88,7 +88,7 @@ def test_what_is_sent_is_what_is_received(marionette: socket.socket) -> None:
 
 
 def test_python_osc_reads_the_order_of_the_specification(marionette: socket.socket) -> None:
-    act = performance("show")
+    act = motion_clip("show")
     performer = Performer(act.skeleton)
     with VmcPerformer(performer, *marionette.getsockname()) as output:
         output.write(performed(0))  # nobody to be seen yet: nothing is sent
@@ -193,7 +193,7 @@ def test_hands_alone_are_refused_in_one_line() -> None:
 
 
 def test_nobody_listening_stops_no_show(marionette: socket.socket) -> None:
-    act = performance("wave")
+    act = motion_clip("wave")
     performer = Performer(act.skeleton)
     performer.follow(seen(act.positions[0], 0))
     host, port = marionette.getsockname()

@@ -24,7 +24,7 @@ from devices.mediapipe.joints import (
     landmarks_to_world,
 )
 from devices.skeleton import Skeleton
-from replay.mediapipe.landmarks import Courses, Take, course, joints_in_metres
+from replay.mediapipe.landmarks import PersonLandmarks, Tracks, joints_in_metres, track
 from replay.mediapipe.pose_binary import PoseFile, has_pose_header, parse_pose
 from replay.mediapipe.text import has_landmark_text, parse_landmark_text
 from replay.recording import Recording
@@ -57,39 +57,40 @@ def read_mediapipe(path: Path) -> Recording:
         raise InputError(f"{path} is larger than {MAX_FILE >> 20} MiB")
     try:
         if has_pose_header(data):
-            takes, notes = _takes(parse_pose(data))
+            people, notes = _people(parse_pose(data))
         else:
-            takes, notes = parse_landmark_text(data)
-        return _recording(takes, notes)
+            people, notes = parse_landmark_text(data)
+        return _recording(people, notes)
     except InputError as error:
         raise InputError(
             f"{path} is no recording of landmarks that can be read: {error}"
         ) from error
 
 
-def _takes(file: PoseFile) -> tuple[list[Take], list[str]]:
+def _people(file: PoseFile) -> tuple[list[PersonLandmarks], list[str]]:
     notes = []
     rate = file.rate
     if rate <= 0:
         rate = USUAL_RATE
         notes.append(f"the frame rate is missing; {rate:.0f} frames a second are assumed")
     times = np.arange(len(file.points)) / rate
-    takes = [
-        _take(times, person, _by_component(file, person)) for person in range(file.points.shape[1])
+    people = [
+        _person(times, person, _by_component(file, person))
+        for person in range(file.points.shape[1])
     ]
-    if not any(take.world for take in takes):
+    if not any(person.world for person in people):
         notes.append("no world landmarks; size and depth are estimated from the image")
-    return takes, notes
+    return people, notes
 
 
 def _by_component(file: PoseFile, person: int) -> dict[str, dict[str, Array]]:
-    """Courses by component and by the name of the point; depth, too, in pixels of the width."""
+    """Tracks by component and by the name of the point; depth, too, in pixels of the width."""
     width = max(file.size[0], 1)
     found: dict[str, dict[str, Array]] = {}
     first = 0
     for name, points in file.components.items():
         found[name] = {
-            point: course(
+            point: track(
                 file.points[:, person, first + index] * (1.0, 1.0, width),
                 file.confidence[:, person, first + index],
             )
@@ -101,27 +102,29 @@ def _by_component(file: PoseFile, person: int) -> dict[str, dict[str, Array]]:
     return found
 
 
-def _world(courses: Mapping[str, Array], size: tuple[int, int]) -> dict[str, Array]:
+def _world(tracks: Mapping[str, Array], size: tuple[int, int]) -> dict[str, Array]:
     """World landmarks in metres: pose-format multiplies x and y by the image's size, as if they
     were of the image, in the versions seen; one that did not is known by its size."""
     width, height = max(size[0], 1), max(size[1], 1)
-    shoulders = [courses[n] for n in ("LEFT_SHOULDER", "RIGHT_SHOULDER") if n in courses]
+    shoulders = [tracks[n] for n in ("LEFT_SHOULDER", "RIGHT_SHOULDER") if n in tracks]
     factors = np.array([1.0, 1.0, 1.0 / width, 1.0])
     if len(shoulders) == 2:
         apart = np.linalg.norm((shoulders[0] - shoulders[1])[:, :2], axis=1)
         if (apart[np.isfinite(apart)] > WORLD_WIDEST).mean() > 0.5 if len(apart) else False:
             factors = np.array([1.0 / width, 1.0 / height, 1.0 / width, 1.0])
-    return {name: found * factors for name, found in courses.items()}
+    return {name: found * factors for name, found in tracks.items()}
 
 
-def _take(times: Array, person: int, components: Mapping[str, Mapping[str, Array]]) -> Take:
+def _person(
+    times: Array, person: int, components: Mapping[str, Mapping[str, Array]]
+) -> PersonLandmarks:
     def lower(name: str) -> dict[str, Array]:
         return {point.lower(): found for point, found in components.get(name, {}).items()}
 
     image, face = lower("POSE_LANDMARKS"), components.get("FACE_LANDMARKS", {})
     if image and "nose" not in image and face:
         image["nose"] = _nose(face, image)
-    return Take(
+    return PersonLandmarks(
         times=times,
         performer=person,
         world=_known(lower("POSE_WORLD_LANDMARKS"), POSE_LANDMARKS),
@@ -132,8 +135,8 @@ def _take(times: Array, person: int, components: Mapping[str, Mapping[str, Array
     )
 
 
-def _known(courses: Courses, names: Sequence[str]) -> dict[str, Array]:
-    return {name: found for name, found in courses.items() if name in names}
+def _known(tracks: Tracks, names: Sequence[str]) -> dict[str, Array]:
+    return {name: found for name, found in tracks.items() if name in names}
 
 
 def _nose(face: Mapping[str, Array], image: Mapping[str, Array]) -> Array:
@@ -142,16 +145,18 @@ def _nose(face: Mapping[str, Array], image: Mapping[str, Array]) -> Array:
     nose = points[0] if len(points) < 3 else np.mean(points, axis=0)
     shoulders = [image[name] for name in ("left_shoulder", "right_shoulder") if name in image]
     deep = np.mean([s[:, 2] for s in shoulders], axis=0) if shoulders else np.zeros(len(nose))
-    return course(np.stack([nose[:, 0], nose[:, 1], deep], axis=1), nose[:, 3])
+    return track(np.stack([nose[:, 0], nose[:, 1], deep], axis=1), nose[:, 3])
 
 
-def _recording(takes: Sequence[Take], notes: Sequence[str]) -> Recording:
-    joints = [joints_in_metres(take) for take in takes]
+def _recording(people: Sequence[PersonLandmarks], notes: Sequence[str]) -> Recording:
+    joints = [joints_in_metres(person) for person in people]
     if not any(joints):
         raise InputError("no body and no hand is seen in any frame")
     skeleton = landmark_skeleton({name for found in joints for name in found})
-    frames = [_frames(skeleton, take, found) for take, found in zip(takes, joints, strict=True)]
-    times = np.concatenate([take.times for take in takes])
+    frames = [
+        _frames(skeleton, person, found) for person, found in zip(people, joints, strict=True)
+    ]
+    times = np.concatenate([person.times for person in people])
     order = np.argsort(times, kind="stable")
     stacked = np.concatenate(frames)[order]
     times = times[order] - times[order[0]]
@@ -161,15 +166,15 @@ def _recording(takes: Sequence[Take], notes: Sequence[str]) -> Recording:
         positions=landmarks_to_world(stacked[..., :3]),
         rotations=None,
         confidence=stacked[..., 3],
-        performers=np.concatenate([np.full(len(t.times), t.performer) for t in takes])[order],
+        performers=np.concatenate([np.full(len(t.times), t.performer) for t in people])[order],
         arrivals=np.full(len(times), np.nan),
         notes=tuple(notes),
     )
 
 
-def _frames(skeleton: Skeleton, take: Take, joints: Mapping[str, Array]) -> Array:
+def _frames(skeleton: Skeleton, person: PersonLandmarks, joints: Mapping[str, Array]) -> Array:
     """(T, J, 4) positions and confidence of one performer."""
-    frames = np.full((len(take.times), len(skeleton.names), 4), np.nan)
+    frames = np.full((len(person.times), len(skeleton.names), 4), np.nan)
     frames[..., 3] = 0.0
     for name, found in joints.items():
         frames[:, skeleton.index(name)] = found
@@ -180,6 +185,6 @@ def _frames(skeleton: Skeleton, take: Take, joints: Mapping[str, Array]) -> Arra
         total = np.where(seen[..., None], parts, 0.0).sum(axis=1)
         any_seen = seen.any(axis=1)
         root[any_seen] = total[any_seen] / seen.sum(axis=1)[any_seen, None]
-    if not take.world and (root[:, 3] > 0).any():
+    if not person.world and (root[:, 3] > 0).any():
         frames[..., :3] -= root[np.argmax(root[:, 3] > 0), :3].copy()
     return frames

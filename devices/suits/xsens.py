@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 
 from devices.address import host_and_port, one_of, options_of
 from devices.skeleton import SkeletonFrame
-from devices.studio.xsens_segments import BODY, FINGERS_A_HAND, xsens_skeleton
+from devices.suits.xsens_segments import BODY, FINGERS_A_HAND, xsens_skeleton
 from devices.transport.clock_map import STEP_BACK, ClockMap
 from devices.transport.live_stream import LiveStream
 from devices.transport.tcp import Framing, TcpTransport

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 SAME_BODY = 0.6  # [m] between where one id was lost and another came up, of the same person
 
 
-class BodyNumbers:
+class PerformerNumbers:
     """Which number each body has, from frame to frame."""
 
     def __init__(self) -> None:

@@ -8,26 +8,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.bodies.joint_labels import first_of, heading_joints, hips_joint, label_joints
+from devices.bodies.joint_labels import label_joints
 from devices.bodies.joint_names import FINGERS, BodyPart, Kind, Side
 from devices.bodies.trunk_and_limbs import above, trunk_and_limbs
 from devices.errors import InputError
 from devices.skeleton import Skeleton
-
-__all__ = [
-    "FINGERS",
-    "PRESETS",
-    "BodyPart",
-    "Kind",
-    "Side",
-    "available_presets",
-    "first_of",
-    "heading_joints",
-    "hips_joint",
-    "label_joints",
-    "source_joints",
-    "source_tree",
-]
 
 PRESETS = (
     "whole",

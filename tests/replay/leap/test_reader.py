@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from devices.errors import InputError
 from devices.leap.joints import FINGERS, chest, leap_to_world
 from replay.formats import read_recording
-from replay.leap import files as leap_files
-from replay.leap.files import read_leap, recognises_leap
+from replay.leap import reader as leap_reader
 from replay.leap.lz_string import lz_pieces
+from replay.leap.reader import read_leap, recognises_leap
 from replay.recording import Recording
 
 
@@ -318,7 +318,7 @@ def lz_bomb(count: int) -> bytes:
 
 
 def test_a_bomb_is_not_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(leap_files, "MAX_BYTES", 1 << 20)
+    monkeypatch.setattr(leap_reader, "MAX_BYTES", 1 << 20)
     path = tmp_path / "bomb.json.lz"
     path.write_bytes(lz_bomb(3000))  # 7 kB for 4.5 MB
     with pytest.raises(InputError, match="unpacks to more than 1 MiB"):

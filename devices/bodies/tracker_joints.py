@@ -42,7 +42,7 @@ def tracker_skeleton() -> Skeleton:
     return Skeleton(JOINTS, np.array(_PARENTS), rest)
 
 
-def places_of(
+def assign_trackers(
     trackers: Array, head: Array | None, facing: Array | None, *, taken: Iterable[int] = ()
 ) -> NDArray[np.int64]:
     """The index in JOINTS of each tracker's place, no place twice, the head's to none.

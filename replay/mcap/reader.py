@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 
 from devices.errors import InputError
 from devices.skeleton import Skeleton, SkeletonFrame
-from replay.mcap.records import (
+from replay.mcap.record_reader import (
     MAGIC,
     DamagedRecordError,
     Fault,

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from devices.address import host_and_port, options_of
 from devices.bodies.unity_space import across_unity, turn_across_unity
 from devices.skeleton import SkeletonFrame
-from devices.studio.rokoko_bones import SKELETON
+from devices.suits.rokoko_bones import SKELETON
 from devices.transport.clock_map import STEP_BACK, ClockMap
 from devices.transport.live_stream import LiveStream
 from devices.transport.udp import UdpTransport

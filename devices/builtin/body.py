@@ -58,7 +58,7 @@ def finger_direction(finger: str) -> Array:
     return np.array([np.cos(angle), np.sin(angle), 0.0])
 
 
-def puppet_skeleton() -> Skeleton:
+def builtin_skeleton() -> Skeleton:
     """The built-in performer's skeleton, 59 joints, standing on y = 0 with 3 cm of foot below."""
     joints: list[tuple[str, str, Array]] = [
         (name, parent, np.array(offset)) for name, parent, offset in _TRUNK

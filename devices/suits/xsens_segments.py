@@ -9,13 +9,13 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from devices.bodies.humanoid_points import Point, at, skeleton_on_humanoid
+from devices.bodies.skeleton_on_humanoid import JointOnHumanoid, at, skeleton_on_humanoid
 from devices.skeleton import Skeleton
 
 BODY = 23
 FINGERS_A_HAND = 20
 
-_TRUNK: dict[str, Point] = {
+_TRUNK: dict[str, JointOnHumanoid] = {
     "Pelvis": at("", "Hips"),
     "L5": at("Pelvis", "Spine"),
     "L3": ("L5", "Spine", "Chest", 0.5),
@@ -48,7 +48,7 @@ def xsens_skeleton(*, fingers: bool = False) -> Skeleton:
     return skeleton_on_humanoid(points)
 
 
-def _hand(side: str) -> dict[str, Point]:
+def _hand(side: str) -> dict[str, JointOnHumanoid]:
     """The segments of one hand; a thumb has no middle phalanx, its first bone is a metacarpal."""
     wrist, carpus = f"{side}Hand", f"{side}Carpus"
     points = {

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from devices.bridge.clock import DRIFT, SAMPLES, ClockOffset
+from devices.bridge.clock_offset import DRIFT, SAMPLES, ClockOffset
 
 
 def exchange(

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from devices.builtin.puppet_body import SIDES, puppet_skeleton
+from devices.builtin.body import SIDES, builtin_skeleton
 from devices.skeleton import Skeleton
 
 Array = NDArray[np.float64]
@@ -62,7 +62,7 @@ class BuiltinMotion:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Performance:
+class MotionClip:
     """An act played by the puppet body, one loop of it.
 
     Attributes:
@@ -107,9 +107,9 @@ def swing(gesture: Gesture, times: Array) -> Array:
     return out
 
 
-def played(act: BuiltinMotion) -> Performance:
+def sample_motion(act: BuiltinMotion) -> MotionClip:
     """The act as frames: forward kinematics with constant bones, the lowest foot on the floor."""
-    skeleton = puppet_skeleton()
+    skeleton = builtin_skeleton()
     count = round(act.seconds * RATE)
     times = np.arange(count) / RATE
     turns = np.zeros((len(skeleton.names), count, 3))
@@ -120,7 +120,7 @@ def played(act: BuiltinMotion) -> Performance:
             turns[skeleton.index(gesture.joint)] += moved
     positions, rotations = _forward(skeleton, turns)
     positions[..., 1] -= _floor(skeleton, positions)[:, None]
-    return Performance(skeleton, times, positions, rotations)
+    return MotionClip(skeleton, times, positions, rotations)
 
 
 def _forward(skeleton: Skeleton, turns: Array) -> tuple[Array, Array]:

@@ -22,7 +22,7 @@ _FEET = 150  # heights of feet that are remembered
 _STANDING = 5.0  # percentile of them that is the floor: below it feet were tracked badly
 
 
-class FloorLevel:
+class CameraLevel:
     """The tilt and height of a camera, learnt frame by frame.
 
     Attributes:

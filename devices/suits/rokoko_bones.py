@@ -6,9 +6,9 @@ format tells of no hierarchy or lengths; those of the built-in body stand in for
 
 from __future__ import annotations
 
-from devices.bodies.humanoid_points import Point, at, skeleton_on_humanoid
+from devices.bodies.skeleton_on_humanoid import JointOnHumanoid, at, skeleton_on_humanoid
 
-_TRUNK: dict[str, Point] = {
+_TRUNK: dict[str, JointOnHumanoid] = {
     "hip": at("", "Hips"),
     "spine": at("hip", "Spine"),
     "chest": ("spine", "Chest", "UpperChest", 0.5),
@@ -28,10 +28,10 @@ _BEYOND = 1.8  # of a finger's middle segment, from its start to the tip
 _TOE_END = 1.3  # of the way from ankle to toes
 
 
-def _side(side: str) -> dict[str, Point]:
+def _side(side: str) -> dict[str, JointOnHumanoid]:
     """The limbs and fingers of "left" or "right"."""
     human = side.capitalize()
-    points: dict[str, Point] = {}
+    points: dict[str, JointOnHumanoid] = {}
     for hung_on, limb in (("chest", _ARM), ("hip", _LEG)):
         parent = hung_on
         for name, bone in limb.items():

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from devices.errors import InputError
 from devices.mediapipe.joints import HAND_LANDMARKS, POSE_LANDMARKS
 from replay.formats import read_recording
-from replay.mediapipe.files import read_mediapipe, recognises_mediapipe
+from replay.mediapipe.reader import read_mediapipe, recognises_mediapipe
 from replay.recording import Recording
 
 WIDTH, HEIGHT, FRAMES = 320, 240, 4

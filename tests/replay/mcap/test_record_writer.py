@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
 
-from replay.mcap.sink import CHUNK_BYTES, McapSink
+from replay.mcap.record_writer import CHUNK_BYTES, McapRecordWriter
 
 SIZES = st.sampled_from((0, 1, 5_000, CHUNK_BYTES - 1, CHUNK_BYTES, 3 * CHUNK_BYTES))
 
@@ -22,7 +22,7 @@ def test_messages_of_any_size_come_back(wishes: list[tuple[int, int, bool]]) -> 
     sent = []
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "a.mcap"
-        with closing(McapSink(path)) as sink:
+        with closing(McapRecordWriter(path)) as sink:
             schema = sink.schema("any", "{}")
             for topic in "ab":
                 sink.channel(topic, schema)

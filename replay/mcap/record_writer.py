@@ -35,7 +35,7 @@ from mcap.records import (
     SummaryOffset,
 )
 
-from replay.mcap.records import MAGIC
+from replay.mcap.record_reader import MAGIC
 
 CHUNK_BYTES = 1 << 20
 _MESSAGE = struct.Struct("<BQHIQQ")  # its head: opcode, size, channel, sequence, two times
@@ -43,7 +43,7 @@ _OPCODE_AND_SIZE = 9  # bytes, which a record's size leaves out
 _ZSTD_LEVEL = 1  # on frames in JSON both smaller and faster than the usual 3
 
 
-class McapSink:
+class McapRecordWriter:
     """Writes records to a new MCAP file: metadata at once, messages in chunks compressed by zstd.
 
     Nothing but `flush`, `metadata`, `finish` and a chunk that is full (1 MiB) writes to the file.

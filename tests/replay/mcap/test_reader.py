@@ -18,8 +18,8 @@ from mcap.writer import CompressionType, Writer
 from devices.errors import InputError
 from devices.skeleton import Skeleton, SkeletonFrame
 from replay.formats import read_recording
-from replay.mcap.file import McapReader, read_mcap
-from replay.mcap.records import walk
+from replay.mcap.reader import McapReader, read_mcap
+from replay.mcap.record_reader import walk
 from replay.mcap.writer import McapWriter
 from replay.recording import Recording
 

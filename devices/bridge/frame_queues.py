@@ -12,7 +12,7 @@ from devices.transport.inbox import Bell, Inbox
 PERFORMERS = 256
 
 
-class BridgeInbox(Protocol):
+class FrameQueue(Protocol):
     """One thread puts, another takes."""
 
     @property
@@ -33,15 +33,15 @@ class BridgeInbox(Protocol):
         ...
 
     @property
-    def held_back(self) -> int:
+    def waiting(self) -> int:
         """Frames that the bridge must wait for to be taken."""
         ...
 
 
-class NewestOfEach:
+class LatestFrames:
     """The newest frame of each performer; a newer one takes its place, and the old is dropped."""
 
-    held_back = 0
+    waiting = 0
 
     def __init__(self) -> None:
         self.dropped = 0
@@ -74,10 +74,10 @@ class NewestOfEach:
         return frames
 
 
-class EveryOne(Inbox):
+class AllFrames(Inbox):
     """Every frame; as many as wait here the bridge sends fewer, so that none is dropped."""
 
     @property
-    def held_back(self) -> int:
+    def waiting(self) -> int:
         """Frames that nobody has taken yet."""
         return len(self._frames)

@@ -5,18 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from devices.bodies.anatomy import (
-    PRESETS,
-    Kind,
-    Side,
-    available_presets,
-    heading_joints,
-    hips_joint,
-    label_joints,
-    source_joints,
-    source_tree,
-)
-from devices.bodies.joint_names import part_of_name
+from devices.bodies.joint_labels import heading_joints, hips_joint, label_joints
+from devices.bodies.joint_names import Kind, Side, part_of_name
+from devices.bodies.source_joints import PRESETS, available_presets, source_joints, source_tree
 from devices.errors import InputError
 from devices.kinect.joints import KINECT_AZURE, KINECT_V1, KINECT_V2
 from devices.skeleton import Skeleton

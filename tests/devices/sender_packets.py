@@ -14,8 +14,8 @@ from scipy.spatial.transform import Rotation
 from devices.kinect.joints import KINECT_V2
 from devices.osc.openni_joints import OPENNI
 from devices.skeleton import Skeleton
-from devices.studio.rokoko_bones import SKELETON as ROKOKO
-from devices.studio.xsens_segments import xsens_skeleton
+from devices.suits.rokoko_bones import SKELETON as ROKOKO
+from devices.suits.xsens_segments import xsens_skeleton
 from tests.devices.vmc_sender import message
 
 XSENS = xsens_skeleton()

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from devices.bodies.anatomy import available_presets, source_joints
+from devices.bodies.source_joints import available_presets, source_joints
 from devices.skeleton import SkeletonFrame
 from devices.stream import open_stream
-from devices.studio.rokoko import MOST_ACTORS, MOST_BYTES, MOST_OVERTAKEN, RokokoDecoder
-from devices.studio.rokoko_bones import SKELETON
+from devices.suits.rokoko import MOST_ACTORS, MOST_BYTES, MOST_OVERTAKEN, RokokoDecoder
+from devices.suits.rokoko_bones import SKELETON
 from devices.transport.live_stream import LiveStream
-from tests.devices.studio_senders import (
+from tests.devices.sender_packets import (
     ROKOKO,
     STEP,
     bones,

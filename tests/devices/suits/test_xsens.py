@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from devices.bodies.anatomy import available_presets
+from devices.bodies.source_joints import available_presets
 from devices.skeleton import SkeletonFrame
 from devices.stream import open_stream
-from devices.studio.xsens import LATE, MOST_CHARACTERS, MOST_OPEN, XsensDecoder
-from devices.studio.xsens_segments import xsens_skeleton
+from devices.suits.xsens import LATE, MOST_CHARACTERS, MOST_OPEN, XsensDecoder
+from devices.suits.xsens_segments import xsens_skeleton
 from devices.transport.live_stream import LiveStream
-from tests.devices.studio_senders import MVN_Y_UP, STEP, XSENS, mxtp01, mxtp02, mxtp13, posed
+from tests.devices.sender_packets import MVN_Y_UP, STEP, XSENS, mxtp01, mxtp02, mxtp13, posed
 
 GLOVES = xsens_skeleton(fingers=True)
 TURNS = Rotation.from_euler("yx", np.linspace(0.1, 1.0, 46).reshape(23, 2))
