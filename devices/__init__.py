@@ -1,1 +1,1 @@
-"""Where performers come in: one module per sensor or protocol, each yields `SkeletonFrame`s."""
+"""Device adapters: each sensor or protocol becomes a stream of `SkeletonFrame`s (metres, +Y up)."""

@@ -1,4 +1,4 @@
-"""What an address such as ``vmc://127.0.0.1:39539?role=performer`` asks for."""
+"""Parse the address of a device, such as ``vmc://127.0.0.1:39539?role=performer``."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ LOOPBACK = "127.0.0.1"
 
 
 def host_and_port(address: SplitResult, port: int) -> tuple[str, int]:
-    """Host and port of an address; this machine only, and `port`, where it does not say.
+    """Return the host and port of an address; the defaults are this machine and `port`.
 
     Raises:
-        InputError: the port is no number from 0 to 65535, or there is more than host and port.
+        InputError: the port is not a number from 0 to 65535, or the address has further parts.
     """
     try:
         chosen = address.port
     except ValueError:
         raise InputError(
-            f"cannot open {address.geturl()!r}: the port is no number from 0 to 65535"
+            f"cannot open {address.geturl()!r}: the port is not a number from 0 to 65535"
         ) from None
     if address.username is not None or address.path.strip("/") or address.fragment:
         raise InputError(
@@ -35,33 +35,33 @@ def host_and_port(address: SplitResult, port: int) -> tuple[str, int]:
 def options_of(
     address: SplitResult, known: Mapping[str, Callable[[str], Any]] | None = None
 ) -> dict[str, Any]:
-    """The options behind the question mark, each read by its reader in `known`.
+    """Return the options after the question mark, each parsed by its function in `known`.
 
     Raises:
-        InputError: an option is not known (the message lists those that are), comes twice, or its
-            reader raises ValueError.
+        InputError: an option is unknown (the message lists the known ones), is given twice, or its
+            function raises ValueError.
     """
-    readers = known or {}
+    parsers = known or {}
     options: dict[str, Any] = {}
     for name, text in parse_qsl(address.query, keep_blank_values=True):
         where = f"cannot open {address.geturl()!r}: option {name!r}"
-        if name not in readers:
-            there = ", ".join(readers) or "none"
-            raise InputError(f"{where} is not known to {address.scheme}://; there are: {there}")
+        if name not in parsers:
+            there = ", ".join(parsers) or "none"
+            raise InputError(f"{where} is unknown to {address.scheme}://; known options: {there}")
         if name in options:
-            raise InputError(f"{where} is there twice; give it once")
+            raise InputError(f"{where} is given twice; give it once")
         try:
-            options[name] = readers[name](text)
+            options[name] = parsers[name](text)
         except ValueError as error:
             raise InputError(f"{where} cannot be {text!r}: {error}") from None
     return options
 
 
 def positive(text: str) -> float:
-    """A finite number above 0.
+    """Parse a finite number above 0.
 
     Raises:
-        ValueError: it is none.
+        ValueError: the text is not such a number.
     """
     try:
         value = float(text)
@@ -73,7 +73,7 @@ def positive(text: str) -> float:
 
 
 def one_of(*words: str) -> Callable[[str], str]:
-    """A reader that takes one of `words`."""
+    """Return a parser that accepts only the given `words`."""
 
     def read(text: str) -> str:
         if text not in words:

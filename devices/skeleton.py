@@ -1,4 +1,4 @@
-"""A performer's skeleton and one captured frame of it: the two types that every room speaks."""
+"""A performer's skeleton and one captured frame of it: the two types that all rooms share."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from devices.errors import InputError
+from solvers.skeleton.tree import Tree, parents_first
 
 
 def _frozen(
@@ -23,16 +24,16 @@ def _frozen(
 
 @dataclass(frozen=True, eq=False)
 class Skeleton:
-    """Joints of one kind of performer, joined as a tree.
+    """The joints of a performer, connected as a tree.
 
     Attributes:
         names: J joint names, unique.
         parents: (J,) int; index of each joint's parent, -1 for the one root. Any order.
-        rest_positions: (J, 3) [m], right-handed, +Y up, facing +Z; where the joints stand at rest.
+        rest_positions: (J, 3) [m], right-handed, +Y up, facing +Z; the joints at rest.
 
     Raises:
-        InputError: a parent index out of range, more than one root, a cycle, a repeated name, or a
-            rest position that is not finite.
+        InputError: a parent index is out of range, there are several roots, a cycle or a repeated
+            name, or a rest position is not finite.
     """
 
     names: tuple[str, ...]
@@ -52,38 +53,39 @@ class Skeleton:
             raise InputError(f"joint name {twice!r} occurs more than once in the skeleton")
         if not np.isfinite(rest).all():
             raise InputError("a rest position of the skeleton is not a finite number")
-        if np.count_nonzero(self.parents == -1) != 1:
-            raise InputError(
-                f"a skeleton needs exactly one root, got {np.count_nonzero(self.parents == -1)}"
-            )
-        if self.parents.min() < -1 or self.parents.max() >= count or len(self.order) != count:
-            raise InputError("the skeleton's parents do not form a tree")
+        try:
+            parents_first(self.parents)
+        except ValueError as error:
+            raise InputError(f"a skeleton needs {error}") from error
 
     @cached_property
+    def tree(self) -> Tree:
+        """The joints as nodes at their rest positions."""
+        return Tree(self.parents, self.rest_positions)
+
+    @property
     def order(self) -> tuple[int, ...]:
         """Joint indices with every parent before its children."""
-        children: list[list[int]] = [[] for _ in self.names]
-        for joint, parent in enumerate(self.parents):
-            if parent >= 0:
-                children[parent].append(joint)
-        order = [int(np.flatnonzero(self.parents == -1)[0])]
-        for joint in order:
-            order.extend(children[joint])
-        return tuple(order)
+        return self.tree.order
+
+    @property
+    def children(self) -> tuple[tuple[int, ...], ...]:
+        """The children of each joint, in ascending order."""
+        return self.tree.children
 
     @property
     def root(self) -> int:
         """Index of the root joint."""
-        return self.order[0]
+        return self.tree.root
 
     def index(self, name: str) -> int:
-        """Index of the joint called `name`.
+        """Return the index of the joint called `name`.
 
         Raises:
-            InputError: no joint has that name; the message lists those there are.
+            InputError: no joint has that name; the message lists the known ones.
         """
         if name not in self.names:
-            raise InputError(f"no joint is called {name!r}; there are: {', '.join(self.names)}")
+            raise InputError(f"no joint is called {name!r}; known joints: {', '.join(self.names)}")
         return self.names.index(name)
 
 
@@ -92,13 +94,13 @@ class SkeletonFrame:
     """One capture of one performer. Frozen because it crosses threads.
 
     Attributes:
-        time: the performer's time [s]: device clock mapped to the host's monotonic clock.
+        time: capture time [s]: the device's clock mapped to the host's monotonic clock.
         positions: (J, 3) [m], world, right-handed, +Y up; NaN where a joint was not seen.
         rotations: (J, 4) unit quaternions (x, y, z, w), joint to world, or None when the source
             has none; NaN where unknown.
         confidence: (J,) in [0, 1]; 0 exactly where the position is NaN.
-        performer: who it is, a small number that stays with a person.
-        arrival: host monotonic time [s] when it came in; NaN when the recording does not say.
+        performer: number of the performer; a person keeps it from frame to frame.
+        arrival: host monotonic time [s] at which the frame came in; NaN if a recording lacks it.
     """
 
     time: float

@@ -1,4 +1,4 @@
-"""The interface of every source of motion, and the door that opens one by its address."""
+"""The interface of every source of skeleton frames, and the function that opens one by address."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from devices.skeleton import Skeleton, SkeletonFrame
 
 
 class SkeletonStream(Protocol):
-    """A source of skeleton frames, live or recorded; the frame loop cannot tell them apart."""
+    """A source of skeleton frames, live or recorded, with the same interface."""
 
     @property
     def skeleton(self) -> Skeleton:
@@ -21,11 +21,11 @@ class SkeletonStream(Protocol):
 
     @property
     def ended(self) -> bool:
-        """True once no frame can come any more; a live source never ends by itself."""
+        """True once no further frame can come; a live source never ends by itself."""
         ...
 
     def poll(self) -> Sequence[SkeletonFrame]:
-        """Every frame that has come since the last poll, oldest first; never blocks."""
+        """Return every frame that came since the last poll, oldest first; never blocks."""
         ...
 
     def close(self) -> None:
@@ -50,12 +50,12 @@ ADAPTERS = {
     "mediapipe": "devices.mediapipe.stream",
     "zmq+tcp": "devices.bridge.stream",
 }
-"""The module of each kind of address. It has `open_device(address: SplitResult)`, and is imported
-only when such an address is opened, so that an SDK that is not there troubles nobody else."""
+"""The module of each address scheme. Each module has `open_device(address: SplitResult)`. It is
+imported only when such an address is opened, so a missing SDK affects no other device."""
 
 
 def open_stream(url: str) -> SkeletonStream:
-    """Open the source of motion at `url`, e.g. ``sim://walk`` or ``vmc://127.0.0.1:39539``.
+    """Open the source at `url`, e.g. ``sim://walk`` or ``vmc://127.0.0.1:39539``.
 
     Raises:
         InputError: the scheme is unknown (the message lists the known ones), or the device cannot
@@ -67,6 +67,6 @@ def open_stream(url: str) -> SkeletonStream:
         raise InputError(f"cannot open {url!r}: not an address ({error})") from error
     if address.scheme not in ADAPTERS:
         known = ", ".join(f"{scheme}://" for scheme in ADAPTERS)
-        raise InputError(f"cannot open {url!r}: no such kind of device; there are: {known}")
+        raise InputError(f"cannot open {url!r}: no such kind of device; known kinds: {known}")
     stream: SkeletonStream = import_module(ADAPTERS[address.scheme]).open_device(address)
     return stream

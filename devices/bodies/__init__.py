@@ -1,1 +1,1 @@
-"""Skeletons of people: what joints are called, which body part each is, and standard bodies."""
+"""Human skeletons: joint names, body parts, standard bodies, and poses in world coordinates."""

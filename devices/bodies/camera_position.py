@@ -1,4 +1,4 @@
-"""Where a body stands before a camera, from its shape in metres and its picture."""
+"""Find the place of a body before a camera from its shape in metres and its image."""
 
 from __future__ import annotations
 
@@ -12,21 +12,22 @@ NEAREST, FURTHEST = 0.2, 30.0  # [m]
 
 
 def camera_position(shape: Array, picture: Array, weights: Array, focal: float) -> Array | None:
-    """The place t (3,) [m] at which a body of known shape and attitude gives its picture.
+    """Return the translation t (3,) [m] at which a body of known shape projects to its image.
 
-    A pinhole sees the point (X, Y, Z) + t at u = f (X + tx) / (Z + tz), and v alike; multiplied
-    out that is linear in t, two equations a point, and t is their least squares: the linear
-    resection of a camera whose rotation is known (Hartley and Zisserman, Multiple View Geometry,
-    chapter 7).
+    A pinhole camera projects the point (X, Y, Z) + t to u = f (X + tx) / (Z + tz), and v alike.
+    Multiplied out, this is linear in t with two equations per point; t is the least-squares
+    solution. This is the linear resection of a camera with known rotation (Hartley and Zisserman,
+    Multiple View Geometry, chapter 7).
 
     Args:
-        shape: (N, 3) [m] the body's points, x to the right of the image, y down, z away.
-        picture: (N, 2) [pixels] the same points from the image's middle.
-        weights: (N,) how much each point counts, in [0, 1].
-        focal: [pixels] focal length f.
+        shape: (N, 3) [m] points of the body, x to the right of the image, y down, z away.
+        picture: (N, 2) [pixels] the same points, measured from the image centre.
+        weights: (N,) weight of each point in [0, 1].
+        focal: focal length f [pixels].
 
     Returns:
-        None where fewer than four points count or the place is not before the camera.
+        The translation, or None if fewer than four points have weight or the solution does not lie
+        before the camera.
     """
     counted = (weights > 0.0) & np.isfinite(shape).all(axis=1) & np.isfinite(picture).all(axis=1)
     if counted.sum() < FEWEST:

@@ -1,7 +1,7 @@
-"""Unity's humanoid: the 55 bones that VMC names, and where they are in an average T-pose.
+"""Unity's humanoid skeleton: the 55 bones that VMC names, in an average T-pose.
 
-A joint is where the bone of that name begins. The offsets are those of a person of 1.7 m; they
-stand in for a sender's where it sends none.
+A joint lies at the start of the bone of the same name. The offsets are those of a person of 1.7 m;
+they are used when a sender gives none.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ OPTIONAL = frozenset(
         *(side + finger + end for side in SIDES for finger in FINGERS for end in SEGMENTS),
     )
 )
-"""Bones that a Unity humanoid may lack; what would hang on one hangs on its nearest ancestor."""
+"""Bones that a Unity humanoid may lack; their children then hang on the nearest ancestor."""
 
 ONWARD = {
     "Chest": "UpperChest",
@@ -62,12 +62,12 @@ ONWARD = {
     "LeftShoulder": "LeftUpperArm",
     "RightShoulder": "RightUpperArm",
 }
-"""Where the body goes on from an optional bone of the trunk."""
+"""The next bone of the trunk or limb after an optional bone."""
 
 
 @lru_cache(maxsize=1)
 def humanoid_skeleton() -> Skeleton:
-    """The 55 bones at rest in a T-pose, feet on the floor, facing +Z."""
+    """Return the 55 bones at rest in a T-pose, feet on the floor, facing +Z."""
     parents: dict[str, str | None] = {}
     rest: dict[str, np.ndarray] = {}
 

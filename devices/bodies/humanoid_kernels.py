@@ -1,4 +1,4 @@
-"""The arithmetic of a humanoid's bones: read from packets, made plausible, laid along the tree."""
+"""Compiled loops for humanoid bones: decode poses, replace bad offsets, compute world poses."""
 
 from __future__ import annotations
 
@@ -15,53 +15,54 @@ Mask = NDArray[np.bool_]
 Indices = NDArray[np.int64]
 Bytes = NDArray[np.uint8]
 
-FARTHEST = 1000.0  # [m] or a position is not believed
+FARTHEST = 1000.0  # [m] of a plausible position
 INFERRED = 0.3
-"""Confidence of a joint that was not sent but is rigid with a bone that was."""
+"""Confidence of a joint that was not sent but is rigid with a received bone."""
 UNSURE = 0.5
-"""Confidence of a bone that keeps its last value, and of all while the sender tracks badly."""
-NO_LENGTH = 1e-4  # [m] below which an offset was not given
+"""Confidence of a bone that keeps its last value, and of all bones while the sender's tracking is
+bad."""
+NO_LENGTH = 1e-4  # [m] below which an offset counts as missing
 LONGEST_BONE = 3.0  # [m]
-OUT_OF_PROPORTION = 20.0  # times longer or shorter than the whole body's scale says
+OUT_OF_PROPORTION = 20.0  # factor by which a bone may deviate from the scale of the whole body
 
 
 class Bones(NamedTuple):
-    """What a sender said of its bones, in our own space.
+    """The received values of the bones, in our coordinates.
 
     Attributes:
-        positions: (J, 3) [m] as sent: offsets from the parent bone; of the hips, from the root.
+        positions: (J, 3) [m] as sent: offset from the parent bone; of the hips, from the root.
         rotations: (J, 4) as sent: bone to parent.
-        held_positions, held_rotations: (J, 3) [m] and (J, 4) in the world, of joints that a tracker
-            holds.
+        pinned_positions, pinned_rotations: (J, 3) [m] and (J, 4) in the world, of joints that a
+            tracker pins.
         root: (7,) position [m] and rotation of the model's root in the world.
-        sent: (J,) bool, bones that were ever sent.
-        held: (J,) bool, joints that a tracker holds.
-        fresh: (J,) bool, joints that the newest frame tells of.
+        sent: (J,) bool, bones that were ever received.
+        pinned: (J,) bool, joints that a tracker pins.
+        fresh: (J,) bool, joints in the newest frame.
     """
 
     positions: Array
     rotations: Array
-    held_positions: Array
-    held_rotations: Array
+    pinned_positions: Array
+    pinned_rotations: Array
     root: Array
     sent: Mask
-    held: Mask
+    pinned: Mask
     fresh: Mask
 
 
 class Structure(NamedTuple):
-    """How a sender's set of bones hangs together.
+    """The structure of a sender's set of bones.
 
     Attributes:
         parents: (J,) of the joints, -1 for the hips.
         order: (J,) all joints, the hips first and every parent before its children.
-        absent: (J,) bool, optional bones that the model does not have.
-        defaults: (J, 3) [m] the built-in body's offsets, each from its nearest ancestor that is not
-            absent.
-        lengths: (J,) [m] of those.
-        along: (K, 2) an absent bone, and the next bone of the trunk that is there.
-        shares: (K,) of the way to that one.
-        seen: (J,) bool, joints whose place is known.
+        absent: (J,) bool, optional bones that the model lacks.
+        defaults: (J, 3) [m] offsets of the built-in body, each from the nearest ancestor that is
+            not absent.
+        lengths: (J,) [m] lengths of `defaults`.
+        along: (K, 2) an absent bone, and the next existing bone of the trunk.
+        shares: (K,) of the distance to that bone.
+        seen: (J,) bool, joints with a known position.
     """
 
     parents: Indices
@@ -75,14 +76,14 @@ class Structure(NamedTuple):
 
 
 class Axes(NamedTuple):
-    """The sender's T-pose: (J, 4) rest rotations of the parents, and the inverse of each bone's."""
+    """The sender's T-pose: (J, 4) rest rotations of the parents, and the inverses of the bones'."""
 
     upper: Array
     inverse: Array
 
 
 class WorldPose(NamedTuple):
-    """Positions (J, 3) [m], rotations (J, 4) in the world, NaN where unknown; confidence (J,)."""
+    """Positions (J, 3) [m] and world rotations (J, 4), NaN where unknown; confidence (J,)."""
 
     positions: Array
     rotations: Array
@@ -93,12 +94,12 @@ class WorldPose(NamedTuple):
 def read_bones(
     data: Bytes, places: Indices, joints: Indices, positions: Array, rotations: Array
 ) -> bool:
-    """Take poses from Unity's space at `places` (n,) of a packet: all of them, or none.
+    """Read poses in Unity's space at offsets `places` (n,) of a packet: all of them or none.
 
-    Each is seven big-endian float32: a position (3,) and a quaternion (4,).
+    Each pose is seven big-endian float32: a position (3,) and a quaternion (4,).
 
     Returns:
-        False where one of them is beyond belief; then nothing was taken.
+        False if a pose is implausible; nothing is written then.
     """
     poses = np.empty((len(places), 7))
     for row in range(len(places)):
@@ -120,7 +121,7 @@ def read_bones(
 
 @kernel
 def _float32(data: Bytes, place: int) -> float:
-    """The big-endian float32 at a place of a packet."""
+    """The big-endian float32 at an offset of a packet."""
     bits = 0
     for byte in data[place : place + 4]:
         bits = bits << 8 | int(byte)
@@ -131,15 +132,15 @@ def _float32(data: Bytes, place: int) -> float:
 def pose_in_world(
     bones: Bones, structure: Structure, axes: Axes, tracking: bool, out: WorldPose
 ) -> None:
-    """Where every joint is, as `WorldPose` says it; less sure where the sender tracks badly."""
+    """Write the pose of every joint to `out`; confidence is lower if `tracking` is False."""
     offsets = np.empty_like(bones.positions)
     turns = np.empty_like(bones.rotations)
     _normalise(bones, axes, offsets, turns)
     _complete(bones, structure, offsets)
-    _place_held(structure.order[0], bones, offsets, turns)
+    _place_pinned(structure.order[0], bones, offsets, turns)
     for joint in structure.order:
         above = structure.parents[joint]
-        if above < 0 or bones.held[joint]:
+        if above < 0 or bones.pinned[joint]:
             out.positions[joint] = offsets[joint]
             out.rotations[joint] = turns[joint]
         else:
@@ -151,10 +152,10 @@ def pose_in_world(
 
 @kernel
 def _normalise(bones: Bones, axes: Axes, offsets: Array, turns: Array) -> None:
-    """Rotations and offsets as of a model whose bones have the world's axes at rest.
+    """Convert rotations and offsets to a model whose bones have the world's axes at rest.
 
-    With R the rest rotation of a bone in the model and P its parent's, a local rotation q becomes
-    P q R^-1 and an offset t becomes P t.
+    With R the rest rotation of a bone in the model and P that of its parent, a local rotation q
+    becomes P q R^-1 and an offset t becomes P t.
     """
     for joint in range(len(turns)):
         _multiply(bones.rotations[joint], axes.inverse[joint], turns[joint])
@@ -164,29 +165,29 @@ def _normalise(bones: Bones, axes: Axes, offsets: Array, turns: Array) -> None:
 
 @kernel
 def _complete(bones: Bones, structure: Structure, offsets: Array) -> None:
-    """Offsets (J, 3) [m] of each joint from its parent; as sent where that can be, else default."""
+    """Complete the offsets (J, 3) [m] from the parents: as sent if plausible, else the default."""
     hips = structure.order[0]
     usable = np.empty(len(offsets), dtype=np.bool_)
-    scale = _believe(offsets, structure, bones.sent, usable)
-    told = usable.any() or offsets[hips].any()
+    scale = _check_offsets(offsets, structure, bones.sent, usable)
+    given = usable.any() or offsets[hips].any()
     for joint in range(len(offsets)):
-        if not (usable[joint] or (joint == hips and bones.sent[hips] and told)):
+        if not (usable[joint] or (joint == hips and bones.sent[hips] and given)):
             offsets[joint] = structure.defaults[joint] * scale
     for row in range(len(structure.shares)):
         absent, following = structure.along[row]
         offsets[absent] = structure.shares[row] * offsets[following]
-    for joint in structure.order[::-1]:  # children first: a parent's is still from its own anchor
+    for joint in structure.order[::-1]:  # children first: a parent's offset is still its own
         above = structure.parents[joint]
         if above >= 0 and structure.absent[above]:
             offsets[joint] -= offsets[above]
 
 
 @kernel
-def _believe(given: Array, structure: Structure, sent: Mask, usable: Mask) -> float:
-    """Mark the bone offsets (J, 3) [m] that can be believed, never the hips', which is no bone.
+def _check_offsets(given: Array, structure: Structure, sent: Mask, usable: Mask) -> float:
+    """Mark the plausible bone offsets (J, 3) [m]; never the hips', which are not a bone.
 
     Returns:
-        the sender's size as a multiple of the built-in body's, 1 where nothing tells.
+        The sender's size as a multiple of the built-in body's; 1 if no offset is usable.
     """
     hips = structure.order[0]
     ratios = np.zeros(len(given))
@@ -206,24 +207,24 @@ def _believe(given: Array, structure: Structure, sent: Mask, usable: Mask) -> fl
 
 
 @kernel
-def _place_held(hips: int, bones: Bones, offsets: Array, turns: Array) -> None:
-    """Set the hips on the model's root, and what trackers hold into the world."""
+def _place_pinned(hips: int, bones: Bones, offsets: Array, turns: Array) -> None:
+    """Place the hips on the model's root, and pinned joints at their world poses."""
     root_turn = bones.root[3:]
     _rotate(root_turn, offsets[hips], offsets[hips])
     offsets[hips] += bones.root[:3]
     _multiply(root_turn, turns[hips], turns[hips])
     for joint in range(len(turns)):
-        if bones.held[joint]:
-            offsets[joint] = bones.held_positions[joint]
-            turns[joint] = bones.held_rotations[joint]
+        if bones.pinned[joint]:
+            offsets[joint] = bones.pinned_positions[joint]
+            turns[joint] = bones.pinned_rotations[joint]
 
 
 @kernel
 def _judge(bones: Bones, seen: Mask, tracking: bool, out: WorldPose) -> None:
-    """Confidences: 1 as sent, INFERRED where rigid with that, UNSURE at most where it is old."""
+    """Set confidences: 1 as sent, INFERRED if rigid with a sent bone, at most UNSURE if old."""
     for joint in range(len(seen)):
         confidence = 1.0
-        if not (bones.sent[joint] or bones.held[joint]):
+        if not (bones.sent[joint] or bones.pinned[joint]):
             confidence = INFERRED if seen[joint] else 0.0
         if not (tracking and bones.fresh[joint]):
             confidence = min(confidence, UNSURE)
@@ -235,7 +236,7 @@ def _judge(bones: Bones, seen: Mask, tracking: bool, out: WorldPose) -> None:
 
 @kernel
 def _rotate(q: Array, v: Array, out: Array) -> None:
-    """A vector (3,) turned by a unit quaternion; `out` may be `v`."""
+    """Rotate a vector (3,) by a unit quaternion; `out` may be `v`."""
     x, y, z, w = q
     a, b, c = v
     d, e, f = 2.0 * (y * c - z * b), 2.0 * (z * a - x * c), 2.0 * (x * b - y * a)
@@ -249,7 +250,7 @@ def _rotate(q: Array, v: Array, out: Array) -> None:
 
 @kernel
 def _multiply(p: Array, q: Array, out: Array) -> None:
-    """The quaternion of the rotation q, then p; `out` may be either."""
+    """Multiply quaternions: the rotation q, then p; `out` may be either."""
     px, py, pz, pw = p
     x, y, z, w = q
     _put4(

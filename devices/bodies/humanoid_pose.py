@@ -1,8 +1,8 @@
-"""From the local poses of some bones of a humanoid to where all of its joints are.
+"""World pose of the 55 humanoid joints from the local poses of the bones that a sender gives.
 
-Senders differ: some give their model's bone offsets, some only rotations and zeros; models lack
-optional bones; bones of VRM 1 need not be at identity in their T-pose. What is missing comes from
-the built-in body, scaled to the sender's.
+Senders differ: some give the bone offsets of their model, some give rotations with zero offsets;
+models lack optional bones; the bones of VRM 1 need not have identity rotations in the T-pose.
+Missing values come from the built-in body, scaled to the sender's size.
 """
 
 from __future__ import annotations
@@ -27,16 +27,16 @@ _ORDER = np.array(SKELETON.order)
 _IDENTITY = np.array([0.0, 0.0, 0.0, 1.0])
 _OPTIONAL = np.array([name in OPTIONAL for name in SKELETON.names])
 _ONWARD = {SKELETON.index(bone): SKELETON.index(to) for bone, to in ONWARD.items()}
-# A knuckle is rigid with its hand; where the finger goes from there nobody knows.
+# A knuckle is rigid with its hand; the directions of the further finger bones cannot be inferred.
 _UNKNOWABLE = np.array([name.endswith(SEGMENTS[1:]) for name in SKELETON.names])
 
 
 @lru_cache(maxsize=64)
 def structure_of(received: bytes) -> Structure:
-    """The structure for a set of bones, given as the bytes of a (J,) bool mask.
+    """Return the structure for a set of received bones, given as the bytes of a (J,) bool mask.
 
-    Without hips a sender gives parts of a body only, and every bone it leaves out is there, at
-    rest; with hips, an optional bone left out is one that its model does not have.
+    A sender without hips sends parts of a body: every bone that it omits exists and is at rest. A
+    sender with hips omits an optional bone only if its model lacks the bone.
     """
     sent = np.frombuffer(received, dtype=np.bool_)
     absent = _OPTIONAL & ~sent if sent[HIPS] else np.zeros(COUNT, dtype=np.bool_)
@@ -68,22 +68,22 @@ def structure_of(received: bytes) -> Structure:
 
 
 class HumanoidPose:
-    """The newest local pose of each bone, and the world pose that they make; in our own space.
+    """The newest local pose of each bone, and the resulting world pose; in our coordinates.
 
     Attributes:
-        bones: what was sent, written in place by whoever reads packets.
+        bones: the received values; the packet decoder writes them in place.
     """
 
     def __init__(self) -> None:
-        self._numbers = np.zeros(14 * COUNT + 7)  # of all bones; one block, quick to compare
-        places, turns, held_places, held_turns, root = np.split(
+        self._numbers = np.zeros(14 * COUNT + 7)  # all bones in one block, fast to compare
+        places, turns, pinned_places, pinned_turns, root = np.split(
             self._numbers, np.cumsum([3 * COUNT, 4 * COUNT, 3 * COUNT, 4 * COUNT])
         )
         self.bones = Bones(
             places.reshape(COUNT, 3),
             turns.reshape(COUNT, 4),
-            held_places.reshape(COUNT, 3),
-            held_turns.reshape(COUNT, 4),
+            pinned_places.reshape(COUNT, 3),
+            pinned_turns.reshape(COUNT, 4),
             root,
             *np.zeros((3, COUNT), dtype=np.bool_),
         )
@@ -91,20 +91,20 @@ class HumanoidPose:
         self._axes = Axes(*np.tile(_IDENTITY, (2, COUNT, 1)))
         self._out = WorldPose(np.empty((COUNT, 3)), np.empty((COUNT, 4)), np.empty(COUNT))
         self.forget()
-        self.world()  # compiled before the first packet comes
+        self.world()  # compile before the first packet
 
     def forget(self) -> None:
-        """Know no bone any more: another model may follow."""
+        """Discard all bones, for example when the sender loads another model."""
         bones = self.bones
-        bones.sent[:] = bones.held[:] = bones.fresh[:] = False
+        bones.sent[:] = bones.pinned[:] = bones.fresh[:] = False
         bones.positions[:] = 0.0
         bones.rotations[:] = _IDENTITY
 
     def calibrate(self) -> None:
-        """Take the present rotations for the model's T-pose.
+        """Take the current rotations as the model's T-pose.
 
-        Each bone's axes are then those of the world at rest, as VRM 0 has them and the built-in
-        body assumes; a VRM 1 model may have bones turned any way.
+        The axes of each bone are then the world axes at rest, as VRM 0 has them and the built-in
+        body assumes; the bones of a VRM 1 model may have any rest rotation.
         """
         kinematics = ForwardKinematics(_PARENTS)
         turns = kinematics.world(self.bones.positions, self.bones.rotations)[1]
@@ -114,11 +114,11 @@ class HumanoidPose:
 
     @property
     def content(self) -> bytes:
-        """Everything that was sent, to be compared with what was sent before."""
+        """The received values as bytes, for comparison with earlier ones."""
         return self._numbers.tobytes()
 
     def world(self, *, tracking: bool = True) -> WorldPose:
-        """Where every joint is, until the next call; less sure where the sender tracks badly."""
+        """Return the pose of every joint, valid until the next call; `tracking` as in `_judge`."""
         structure = structure_of(self.bones.sent.tobytes())
         pose_in_world(self.bones, structure, self._axes, tracking, self._out)
         return self._out

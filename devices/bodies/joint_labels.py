@@ -1,4 +1,4 @@
-"""Which part of the body each joint of a skeleton is, whatever its names' convention."""
+"""Label each joint of a skeleton with a body part, for any naming convention."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from devices.skeleton import Skeleton
 
 _SIDED = (Side.LEFT, Side.RIGHT)
 _BY_NUMBER = (Kind.THUMB, Kind.INDEX, Kind.MIDDLE, Kind.RING, Kind.LITTLE)
-_ENOUGH = 4  # parts told by names below which the shape of the skeleton is asked instead
-_MOST_JOINTS_BY_SHAPE = 1000  # more are no body; the search is quadratic
+_ENOUGH = 4  # parts known by name, below which the shape of the skeleton decides
+_MOST_JOINTS_BY_SHAPE = 1000  # a larger skeleton is not a body; the search is quadratic
 
 
 def label_joints(skeleton: Skeleton) -> tuple[BodyPart | None, ...]:
-    """The part of the body that begins at each joint; None where nothing tells.
+    """Return the body part that begins at each joint; None where it is unknown.
 
-    Names decide first (`devices.bodies.joint_names`); words that mean different joints in different
-    conventions are settled by what else the same side has; if names tell next to nothing, the
-    shape of the rest pose does, taking +X for the performer's left.
+    Names decide first (`devices.bodies.joint_names`). Words that mean different joints in different
+    conventions are resolved by the other joints of the same side. If too few names are known, the
+    shape of the rest pose decides; it assumes that the performer's left is at +X.
     """
     parts: list[BodyPart | None] = [part_of_name(name) for name in skeleton.names]
     told = sum(part is not None and part.kind is not Kind.ROOT for part in parts)
@@ -38,7 +38,7 @@ def label_joints(skeleton: Skeleton) -> tuple[BodyPart | None, ...]:
 
 
 def heading_joints(skeleton: Skeleton) -> list[tuple[int, int]]:
-    """Pairs of joints (left, right) whose direction tells where the body faces: hips, shoulders."""
+    """Return pairs of joints (left, right) across which the body faces: hips, shoulders."""
     parts = label_joints(skeleton)
     pairs = []
     for kind in (Kind.UPPER_LEG, Kind.UPPER_ARM):
@@ -49,9 +49,9 @@ def heading_joints(skeleton: Skeleton) -> list[tuple[int, int]]:
 
 
 def hips_joint(skeleton: Skeleton) -> int:
-    """The joint that carries the body: the hips, else the skeleton's root.
+    """Return the joint that carries the body: the hips, else the skeleton's root.
 
-    Not always the root itself: some rigs put one on the floor that does not follow the body.
+    Some rigs put the root on the floor, where it does not follow the body.
     """
     hips = first_of(label_joints(skeleton), skeleton, Kind.HIPS)
     return skeleton.root if hips is None else hips
@@ -60,7 +60,7 @@ def hips_joint(skeleton: Skeleton) -> int:
 def first_of(
     parts: Sequence[BodyPart | None], skeleton: Skeleton, kind: Kind, side: Side = Side.CENTRE
 ) -> int | None:
-    """The joint nearest to the root that begins `kind` on `side`, or None."""
+    """Return the joint nearest to the root that begins `kind` on `side`, or None."""
     for joint in skeleton.order:
         part = parts[joint]
         if part is not None and part.kind is kind and part.side is side and not part.tip:
@@ -69,10 +69,10 @@ def first_of(
 
 
 def _settle_limb(parts: list[BodyPart | None], side: Side, skeleton: Skeleton) -> None:
-    """Decide on one side what "shoulder", "hip", "arm", "leg" and "foot" stand for.
+    """Resolve the meaning of "shoulder", "hip", "arm", "leg" and "foot" on one side.
 
-    Kinect and SMPL name points, so that the upper arm begins at "ShoulderLeft" and toes at
-    "FootLeft"; rigs name bones, so that the clavicle is "LeftShoulder" and the shin "LeftLeg".
+    Kinect and SMPL name points: the upper arm begins at "ShoulderLeft" and the toes at "FootLeft".
+    Rigs name bones: the clavicle is "LeftShoulder" and the shin "LeftLeg".
     """
 
     def joints(*words: str) -> list[int]:
@@ -106,7 +106,7 @@ def _settle_limb(parts: list[BodyPart | None], side: Side, skeleton: Skeleton) -
 
 
 def _settle_centre(parts: list[BodyPart | None], skeleton: Skeleton) -> None:
-    """A root that branches is the hips where nothing else is; a nose is the head where none is."""
+    """Label a branching root as hips if there are no hips, and a nose as head if there is none."""
     if first_of(parts, skeleton, Kind.HIPS) is None:
         for joint in skeleton.order:
             part = parts[joint]
@@ -122,7 +122,7 @@ def _settle_centre(parts: list[BodyPart | None], skeleton: Skeleton) -> None:
 
 
 def _settle_fingers(parts: list[BodyPart | None], skeleton: Skeleton) -> None:
-    """Tell numbered fingers apart, and give what hangs on a finger without a side its hand's side.
+    """Resolve numbered fingers, and give a finger without a side the side of its parent.
 
     MakeHuman counts fingers from 1 and metacarpals from the index finger; 3ds Max Biped counts
     from 0 and writes the second bone of finger 1 as 11.
@@ -145,7 +145,7 @@ def _settle_fingers(parts: list[BodyPart | None], skeleton: Skeleton) -> None:
 
 
 def _label_by_shape(skeleton: Skeleton) -> list[BodyPart | None]:
-    """Parts of an upright body with two legs, two arms and a head, found by the rest pose alone."""
+    """Label an upright body with two legs, two arms and a head from its rest pose alone."""
     parts: list[BodyPart | None] = [None] * len(skeleton.names)
     rest = skeleton.rest_positions
     size = float(np.ptp(rest, axis=0).max())
@@ -181,7 +181,7 @@ def _label_by_shape(skeleton: Skeleton) -> list[BodyPart | None]:
 
 
 def _branches(skeleton: Skeleton, joint: int, least: float) -> list[int]:
-    """Children of `joint` whose branch reaches at least `least` [m] away from it."""
+    """Children of `joint` whose branch reaches at least `least` [m] away from `joint`."""
     rest = skeleton.rest_positions
     return [
         int(child)
@@ -192,7 +192,7 @@ def _branches(skeleton: Skeleton, joint: int, least: float) -> list[int]:
 
 
 def _fork(skeleton: Skeleton, joint: int, least: float) -> int | None:
-    """The first joint from `joint` outwards where three or more long branches part."""
+    """The first joint from `joint` outwards at which three or more long branches meet."""
     while True:
         branches = _branches(skeleton, joint, least)
         if len(branches) >= 3:
@@ -203,7 +203,7 @@ def _fork(skeleton: Skeleton, joint: int, least: float) -> int | None:
 
 
 def _longest_chain(skeleton: Skeleton, joint: int) -> list[int]:
-    """Joints from `joint` to the leaf that is furthest along the bones."""
+    """Joints from `joint` to the leaf that is farthest along the bones."""
     rest = skeleton.rest_positions
     length = {joint: 0.0}
     for child in skeleton.order:
@@ -219,7 +219,7 @@ def _longest_chain(skeleton: Skeleton, joint: int) -> list[int]:
 def _pair(
     limbs: list[list[int]], rest: NDArray[np.float64], centre: int
 ) -> tuple[list[int], list[int]] | None:
-    """The two limbs, left first, that end furthest to either side, if they are alike in length."""
+    """The two limbs, left first, that end farthest to either side, if they have equal lengths."""
     if len(limbs) < 2:
         return None
     ends = [float(rest[limb[-1], 0] - rest[centre, 0]) for limb in limbs]
@@ -236,7 +236,7 @@ def _label_limb(
     kinds: tuple[Kind, Kind, Kind],
     side: Side,
 ) -> None:
-    """Name a chain from its root on: the elbow or knee lies halfway, the hand at the end."""
+    """Label a chain from its start: the elbow or knee lies halfway, the hand or foot at the end."""
     along = np.linalg.norm(np.diff(rest[limb], axis=0), axis=1).cumsum()
     for place, joint in enumerate(limb):
         s = along[place - 1] / max(along[-1], 1e-12) if place else 0.0

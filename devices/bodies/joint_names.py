@@ -1,10 +1,10 @@
-"""What a joint's name says about the body: side and part, whatever convention it follows.
+"""Derive the side and body part of a joint from its name, for many naming conventions.
 
-Names are cut into words (camel case, digits, separators, name spaces, the prefixes of rigs), the
-side is taken out, and what is left is looked up in the tables below. The tables cover Kinect v1, v2
-and Azure, CMU (ASF and the BVH conversions), Bandai-Namco, Mixamo, MotionBuilder, MakeHuman, DAZ,
-3ds Max Biped, Unity and VRM humanoids, Unreal, Rigify, Rokoko, Xsens, OptiTrack, SMPL, OpenPose,
-MediaPipe, Leap Motion and OpenXR.
+A name is split into words (camel case, digits, separators, name spaces, prefixes of rigs). The
+word for the side is removed, and the rest is looked up in the tables below. The tables cover Kinect
+v1, v2 and Azure, CMU (ASF and the BVH conversions), Bandai-Namco, Mixamo, MotionBuilder, MakeHuman,
+DAZ, 3ds Max Biped, Unity and VRM humanoids, Unreal, Rigify, Rokoko, Xsens, OptiTrack, SMPL,
+OpenPose, MediaPipe, Leap Motion and OpenXR.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from itertools import pairwise
 
 
 class Side(StrEnum):
-    """Which side of the performer's own body a joint is on."""
+    """The side of the performer's own body."""
 
     LEFT = "left"
     RIGHT = "right"
@@ -25,7 +25,7 @@ class Side(StrEnum):
 
 
 class Kind(StrEnum):
-    """Which part of the body begins at a joint: UPPER_ARM is at the shoulder, FOOT at the ankle."""
+    """The part of the body that begins at a joint: UPPER_ARM at the shoulder, FOOT at the ankle."""
 
     ROOT = "root"
     HIPS = "hips"
@@ -59,13 +59,13 @@ FINGERS = (Kind.THUMB, Kind.INDEX, Kind.MIDDLE, Kind.RING, Kind.LITTLE, Kind.FIN
 class BodyPart:
     """The part of the body that begins at a joint.
 
-    Attributes:
-        kind: the part.
-        side: the performer's own left or right, or the centre.
-        tip: the joint only ends the part (head top, finger tip, an end site); nothing moves there.
-        word: the word of the name that told; "shoulder", "hip", "leg", "foot" mean different joints
-            in different conventions, and `devices.bodies.joint_labels` decides between them.
-        number: the first number in the name, or None ("finger2-1" has 2).
+    kind: the part.
+    side: the performer's own left or right, or the centre.
+    tip: the joint only ends the part (head top, finger tip, end site) and moves nothing.
+    word: the word of the name that determined the part. "shoulder", "hip", "leg" and "foot"
+        mean different joints in different conventions; `devices.bodies.joint_labels` resolves
+        them.
+    number: the first number in the name, or None ("finger2-1" has 2).
     """
 
     kind: Kind
@@ -111,8 +111,8 @@ _WORDS: dict[Kind, str] = {
     "deltoid pectoral glute attach attachment locator camera marker collider holder",
 }
 _KIND_OF_WORD = {word: kind for kind, words in _WORDS.items() for word in words.split()}
-# Looked for inside a name of several words, before and after its neighbouring words are tried in
-# pairs: "LeftHandThumb1" is a thumb, "thigh_twist_l" a helper, "upper_leg_front" an upper leg.
+# Words searched for inside a name of several words, before and after pairs of neighbouring words
+# are tried: "LeftHandThumb1" is a thumb, "thigh_twist_l" a helper, "upper_leg_front" an upper leg.
 _FIRST = (
     *_WORDS[Kind.HELPER].split(),
     *(word for kind in FINGERS for word in _WORDS[kind].split()),
@@ -142,14 +142,12 @@ _VERTEBRA = re.compile(r"^[LTC]\d{1,2}$")  # Xsens: L5, L3, T12, T8
 
 @lru_cache(maxsize=16384)
 def part_of_name(name: str) -> BodyPart | None:
-    """The part of the body that a joint's name alone stands for, or None for an unknown name."""
+    """Return the body part that a joint's name alone describes, or None for an unknown name."""
     plain = re.split(r"[:|]", name)[-1].strip()
     if _VERTEBRA.match(plain):
         return BodyPart(Kind.CHEST if plain[0] == "T" else Kind.SPINE, word="spine")
     if plain.startswith("__"):
-        return BodyPart(
-            Kind.HELPER, word="helper"
-        )  # MakeHuman's stub before a bone set off its parent
+        return BodyPart(Kind.HELPER, word="helper")  # MakeHuman's stub bone before an offset bone
     plain = _PREFIX.sub("", plain) or plain
     tokens = [token.lower() for token in _SPLIT.findall(plain)]
     digits = [int(token) for token in tokens if token.isdigit() and len(token) < 4]
@@ -162,7 +160,7 @@ def part_of_name(name: str) -> BodyPart | None:
 
 
 def _take_side(words: list[str]) -> tuple[list[str], Side]:
-    """Words without the one that names a side, even where it is glued on: "lhumerus"."""
+    """Remove the word for a side, also where it is a prefix: "lhumerus"."""
     whole = "".join(words)
     if whole not in _KIND_OF_WORD:
         for mark, side in _SIDES:
@@ -185,7 +183,7 @@ def _take_tip(words: list[str]) -> tuple[list[str], bool]:
 
 
 def _word_of(words: list[str], side: Side) -> str | None:
-    """The table's word that the words of a name amount to, or None."""
+    """The table's word that matches the words of a name, or None."""
     if words == ["mid"] and side is not Side.CENTRE:
         return "middle"  # DAZ: rMid1
     if "".join(words) in _KIND_OF_WORD:

@@ -1,8 +1,8 @@
-"""Small numbers for bodies that a sensor knows by ids of its own.
+"""Assign stable performer numbers to bodies whose sensor ids change.
 
-A sensor's slots say nothing, and its ids change when a person was lost for a moment. A number
-stays with an id; of a body with a new id it is the free number whose last holder left nearest by,
-else the lowest number that is free.
+A sensor's slots are not identities, and its ids change when a person is lost for a moment. An id
+keeps its number. A body with a new id takes the free number whose last body was lost nearest to
+it, otherwise the lowest free number.
 """
 
 from __future__ import annotations
@@ -14,21 +14,21 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-SAME_BODY = 0.6  # [m] between where one id was lost and another came up, of the same person
+SAME_BODY = 0.6  # [m] at most between the place where an id was lost and the place of a new one
 
 
 class PerformerNumbers:
-    """Which number each body has, from frame to frame."""
+    """The performer number of each body, from frame to frame."""
 
     def __init__(self) -> None:
-        self._ids: list[int] = []  # the last holder of each number
+        self._ids: list[int] = []  # the last id with each number
         self._places: list[Array] = []
 
     def __call__(self, bodies: Mapping[int, Array]) -> dict[int, int]:
-        """The number of each body of one frame.
+        """Return the number of each body of one frame.
 
         Args:
-            bodies: by the sensor's id, where the body is (3,) [m]; NaN where that is not known.
+            bodies: position (3,) [m] of each body by the sensor's id; NaN where unknown.
         """
         numbers = {body: self._ids.index(body) for body in bodies if body in self._ids}
         for body, place in bodies.items():

@@ -1,4 +1,4 @@
-"""Skeletons of other makers, laid on the built-in body: where their joints are at rest."""
+"""Build the rest skeletons of other makers from points on the bones of the humanoid body."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from devices.bodies.humanoid import humanoid_skeleton
 from devices.skeleton import Skeleton
 
 JointOnHumanoid = tuple[str, str, str, float]
-"""A joint's parent, "" for the root; two bones of the humanoid; the share of the way from where the
-first begins to where the second does, beyond 1 or not."""
+"""A joint's parent ("" for the root), two bones of the humanoid, and the joint's place on the line
+from the start of the first bone (0) to the start of the second (1); it may lie beyond either."""
 
 
 def at(parent: str, bone: str) -> JointOnHumanoid:
-    """A joint that begins where a bone of the humanoid does."""
+    """Return a joint that lies at the start of a humanoid bone."""
     return parent, bone, bone, 0.0
 
 
 def skeleton_on_humanoid(points: Mapping[str, JointOnHumanoid]) -> Skeleton:
-    """The joints of `points`, in their order, on a body of 1.7 m in a T-pose that faces +Z."""
+    """Return the joints of `points`, in their order, on a 1.7 m body in a T-pose facing +Z."""
     human = humanoid_skeleton()
     places = {name: human.rest_positions[joint] for joint, name in enumerate(human.names)}
     names = tuple(points)

@@ -1,4 +1,4 @@
-"""Which joints of a performer drive: by preset (arms, a hand, the spine) or by name."""
+"""The performer joints that drive a character, chosen with `--source` by preset or by name."""
 
 from __future__ import annotations
 
@@ -32,29 +32,27 @@ _TRUNK = (Kind.HIPS, Kind.SPINE, Kind.CHEST, Kind.NECK, Kind.HEAD)
 _ARM = (Kind.UPPER_ARM, Kind.LOWER_ARM, Kind.HAND)
 _LEG = (Kind.UPPER_LEG, Kind.LOWER_LEG, Kind.FOOT, Kind.TOES)
 _SIDES = (Side.LEFT, Side.RIGHT)
-_FEWEST_FINGERS = (
-    3  # named fingers that make a hand worth driving with; Kinect has a thumb and a tip
-)
+_FEWEST_FINGERS = 3  # named fingers of a usable hand preset; a Kinect hand has a thumb and a tip
 
 
 def available_presets(skeleton: Skeleton) -> tuple[str, ...]:
-    """The presets of `--source` that this skeleton has, in the order of `PRESETS`."""
+    """Return the presets of `--source` that this skeleton supports, in the order of `PRESETS`."""
     chosen = _presets(skeleton)
     return tuple(name for name in PRESETS if name in chosen)
 
 
 def source_joints(skeleton: Skeleton, source: str) -> list[int]:
-    """The joints that `--source` chooses, parents before children; they need not be connected.
+    """Return the joints that `--source` chooses, parents first; they need not be connected.
 
     Args:
-        skeleton: the performer's.
-        source: a preset, or names of joints and presets with commas between; case does not matter,
-            a name space ("mixamorig:") may be left out, and the beginning of a name is enough
-            where only one joint begins so.
+        skeleton: the performer's skeleton.
+        source: a preset, or names of joints and presets separated by commas. Case does not matter,
+            a name space ("mixamorig:") may be omitted, and an unambiguous beginning of a name is
+            enough.
 
     Raises:
-        InputError: a name that is neither, or stands for several joints, or a preset that this
-            skeleton does not have; the message lists what there is.
+        InputError: an item is neither a joint nor a preset, names several joints, or is a preset
+            that this skeleton lacks; the message lists the available ones.
     """
     chosen: set[int] = set()
     items = [item.strip() for item in source.split(",") if item.strip()]
@@ -70,21 +68,21 @@ def source_joints(skeleton: Skeleton, source: str) -> list[int]:
 
 
 def source_tree(skeleton: Skeleton, joints: Iterable[int]) -> tuple[NDArray[np.int64], list[int]]:
-    """The tree that the chosen joints form, each hung on its nearest chosen ancestor.
+    """Return the tree that the chosen joints form; each joint hangs on its nearest chosen ancestor.
 
-    Where several would be roots their nearest common ancestor is added, so that two arms meet at
-    the chest.
+    If the result would have several roots, their nearest common ancestor is added: two arms are
+    joined at the chest.
 
     Returns:
-        parents (K,): index into `joints` of each one's parent, -1 for the root.
+        parents (K,): index into `joints` of each joint's parent, -1 for the root.
         joints: K joint indices of the skeleton, parents before children.
 
     Raises:
-        InputError: no joint at all.
+        InputError: no joint is chosen.
     """
     chosen = set(joints)
     if not chosen:
-        raise InputError("no joint of the performer is chosen to drive with")
+        raise InputError("no joint of the performer is chosen as a source; give --source joints")
     roots = [joint for joint in chosen if above(skeleton, joint, chosen) is None]
     if len(roots) > 1:
         chosen.add(_common_ancestor(skeleton, roots))
@@ -100,7 +98,7 @@ def _listed(names: Iterable[str]) -> str:
 
 
 def _joint_called(skeleton: Skeleton, name: str) -> int:
-    """The one joint that `name` stands for; see `source_joints`."""
+    """Return the one joint that `name` refers to; see `source_joints`."""
     if name in skeleton.names:
         return skeleton.names.index(name)
     plain = name.lower()
@@ -117,35 +115,25 @@ def _joint_called(skeleton: Skeleton, name: str) -> int:
         return found[0]
     if found:
         several = _listed(skeleton.names[joint] for joint in found[:8])
-        raise InputError(f"--source {name!r} stands for {len(found)} joints: {several}")
+        raise InputError(f"--source {name!r} matches {len(found)} joints: {several}; give one name")
     there = _listed(available_presets(skeleton))
     if plain in PRESETS:
-        raise InputError(f"this performer has no {plain!r} to drive with; --source can be: {there}")
+        raise InputError(f"this performer has no {plain!r}; --source can be: {there}")
     joints = _listed(skeleton.names[:60]) + (" ..." if len(full) > 60 else "")
     raise InputError(
-        f"--source {name!r} is no joint of this performer; presets: {there}; joints: {joints}"
+        f"--source {name!r} is not a joint of this performer; presets: {there}; joints: {joints}"
     )
 
 
-def _path(skeleton: Skeleton, joint: int) -> list[int]:
-    """From the skeleton's root to `joint`."""
-    path = [joint]
-    while skeleton.parents[path[-1]] >= 0:
-        path.append(int(skeleton.parents[path[-1]]))
-    return path[::-1]
-
-
 def _common_ancestor(skeleton: Skeleton, joints: Sequence[int]) -> int:
-    common = _path(skeleton, joints[0])
-    for joint in joints[1:]:
-        both = zip(common, _path(skeleton, joint), strict=False)
-        common = [ours for ours, theirs in both if ours == theirs]
-    return common[-1]
+    """The joint nearest to the root that all paths from the root to `joints` share last."""
+    paths = [skeleton.tree.chain(skeleton.root, joint) for joint in joints]
+    return next(joint for joint in reversed(paths[0]) if all(joint in path for path in paths))
 
 
 @lru_cache(maxsize=64)
 def _presets(skeleton: Skeleton) -> dict[str, tuple[int, ...]]:
-    """Joints of each preset that the skeleton has."""
+    """The joints of each preset that the skeleton supports."""
     parts = label_joints(skeleton)
     hands = {side: _hand(parts, side) for side in (*_SIDES, Side.CENTRE)}
     if not _is_body(parts):
@@ -162,7 +150,7 @@ def _presets(skeleton: Skeleton) -> dict[str, tuple[int, ...]]:
 
 
 def _is_body(parts: Sequence[BodyPart | None]) -> bool:
-    """Whether names or shape tell of a body: a trunk, and limbs on both sides of it."""
+    """Whether the labels describe a body: a trunk with limbs on both sides."""
     there = {(part.kind, part.side) for part in parts if part is not None}
     limbs = any(
         all((kind, side) in there for side in _SIDES) for kind in (Kind.UPPER_ARM, Kind.UPPER_LEG)
@@ -197,7 +185,7 @@ def _body_presets(
 
 
 def _limb_part(skeleton: Skeleton, parts: Sequence[BodyPart | None], joint: int) -> BodyPart | None:
-    """A joint's part; a knuckle that was kept as the end of the hand counts as hand."""
+    """The part of a joint; a knuckle that was kept as the end of the hand counts as hand."""
     part = parts[joint]
     if part is not None and part.kind in FINGERS:
         return BodyPart(Kind.HAND, part.side, tip=True)
@@ -205,7 +193,7 @@ def _limb_part(skeleton: Skeleton, parts: Sequence[BodyPart | None], joint: int)
 
 
 def _hand(parts: Sequence[BodyPart | None], side: Side) -> tuple[int, ...]:
-    """Wrist, palm and fingers of one side, if it has enough fingers; () otherwise."""
+    """Wrist, palm and fingers of one side, or () if too few fingers are labelled."""
     there = [
         (joint, part)
         for joint, part in enumerate(parts)

@@ -1,4 +1,4 @@
-"""Where on a body trackers are that nobody named: told from a performer who stands upright."""
+"""Assign unnamed trackers to joints of the body, from a performer who stands upright."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ JOINTS = (
     "Head",
     *(side + bone for bone in ("LowerArm", "LowerLeg", "Foot") for side in SIDES),
 )
-"""Where VRChat knows trackers: hip, chest, head, elbows, knees, feet."""
+"""The joints at which VRChat supports trackers: hip, chest, head, elbows, knees, feet."""
 
 HEAD = JOINTS.index("Head")
 _PARENTS = (-1, 0, 1, 1, 1, 0, 0, 5, 6)
-_ARM_DOWN = 0.3  # [rad] from the vertical, as an upper arm hangs
-_LEAST_HEIGHT = 0.3  # [m] of a head by which a body can be measured
+_ARM_DOWN = 0.3  # [rad] from the vertical: a hanging upper arm
+_LEAST_HEIGHT = 0.3  # [m] of the head, below which it gives no body height
 
 
 def tracker_skeleton() -> Skeleton:
-    """The places of trackers on a body with its arms down, facing +Z."""
+    """Return the tracker joints on a body with its arms down, facing +Z."""
     human = humanoid_skeleton()
     rest = human.rest_positions[[human.index(name) for name in JOINTS]].copy()
     for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
@@ -45,16 +45,16 @@ def tracker_skeleton() -> Skeleton:
 def assign_trackers(
     trackers: Array, head: Array | None, facing: Array | None, *, taken: Iterable[int] = ()
 ) -> NDArray[np.int64]:
-    """The index in JOINTS of each tracker's place, no place twice, the head's to none.
+    """Return the index in JOINTS of each tracker's joint; all differ, and none is the head.
 
-    The places of a body of the performer's height, standing where the trackers are, are assigned
-    so that the sum of squared distances is least.
+    A body of the performer's height is placed at the trackers. The assignment minimises the sum of
+    squared distances.
 
     Args:
         trackers: (n, 3) [m], n at most 8.
-        head: (3,) [m] where the head is, if it is known; gives the height.
-        facing: (4,) rotation of the head as (x, y, z, w), if it is known; the body turns with it.
-        taken: places that others have.
+        head: (3,) [m] position of the head, if known; it gives the body height.
+        facing: (4,) rotation of the head (x, y, z, w), if known; it gives the body's heading.
+        taken: joints that other trackers have.
     """
     places = tracker_skeleton().rest_positions
     scale = 1.0

@@ -1,4 +1,4 @@
-"""The joints of a body that a match should see: trunk and limbs, without the clutter of its rig."""
+"""Select the joints of trunk and limbs for matching, without fingers, face and rig helpers."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ _TRUNK = (Kind.HIPS, Kind.SPINE, Kind.CHEST, Kind.NECK, Kind.HEAD)
 _ARM = (Kind.UPPER_ARM, Kind.LOWER_ARM)
 _LEG = (Kind.UPPER_LEG, Kind.LOWER_LEG, Kind.FOOT, Kind.TOES)
 _LIMB = (Kind.SHOULDER, Kind.HAND, *_ARM, *_LEG)
-# Parts of the rest pose's size: face bones that reach so far are a trunk or a snout, unnamed ones
-# a wing or a fin; a joint so close to the one above gives its bone no direction.
+# Shares of the size of the rest pose: face bones of this reach are a trunk or a snout, unnamed ones
+# a wing or a fin; a joint this close to its parent gives its bone no direction.
 _LONG_FACE, _LONG_UNNAMED, _COINCIDENT = 0.2, 0.15, 1e-3
-_HAND_LENGTH = (0.2, 0.9)  # of the forearm
+_HAND_LENGTH = (0.2, 0.9)  # shares of the forearm
 
 
 def trunk_and_limbs(skeleton: Skeleton, parts: Sequence[BodyPart | None]) -> tuple[int, ...]:
-    """The joints of trunk and limbs, parents first, without what would blur a match.
+    """Return the joints of trunk and limbs, parents first, without those that blur a match.
 
-    Left out: eyes, ears and the bones of the face, fingers, hand tips and thumbs, twist and helper
-    bones, all toes but one, roots on the floor, joints that stand where the one above stands.
+    Omitted: eyes, ears and other bones of the face, fingers, hand tips and thumbs, twist and helper
+    bones, all toes but one, roots on the floor, joints at the position of their parent.
     Kept: tails, trunks, wings and other long branches of creatures.
 
     Args:
@@ -40,13 +40,10 @@ def trunk_and_limbs(skeleton: Skeleton, parts: Sequence[BodyPart | None]) -> tup
 
 
 def _kept(skeleton: Skeleton, parts: Sequence[BodyPart | None], size: float) -> set[int]:
-    """The joints that are kept by themselves, before hands and feet are given an end."""
-    children: list[list[int]] = [[] for _ in parts]
-    for joint in skeleton.order[1:]:
-        children[skeleton.parents[joint]].append(joint)
+    """The joints that are kept on their own, before hands and feet get an end."""
     there = {(part.kind, part.side) for part in parts if part is not None}
     kept: set[int] = set()
-    endings: set[tuple[Kind, int | None]] = set()  # hands and toes, by the joint they hang on
+    endings: set[tuple[Kind, int | None]] = set()  # hands and toes, by their kept parent
     for joint in skeleton.order:
         part, parent = parts[joint], int(skeleton.parents[joint])
         hung_on = above(skeleton, joint, kept)
@@ -60,9 +57,7 @@ def _kept(skeleton: Skeleton, parts: Sequence[BodyPart | None], size: float) -> 
             )
         elif parent in kept and (part is None or part.kind is Kind.FACE):
             long = (_LONG_UNNAMED if part is None else _LONG_FACE) * size
-            keep = (
-                _goes_on(parts, joint, parent) or _reach(skeleton, parts, children, joint) >= long
-            )
+            keep = _goes_on(parts, joint, parent) or _reach(skeleton, parts, joint) >= long
         else:
             keep = False
         if keep:
@@ -73,23 +68,19 @@ def _kept(skeleton: Skeleton, parts: Sequence[BodyPart | None], size: float) -> 
 
 
 def above(skeleton: Skeleton, joint: int, chosen: set[int]) -> int | None:
-    """The nearest ancestor of `joint` that is chosen, or None."""
+    """Return the nearest ancestor of `joint` in `chosen`, or None."""
     parent = int(skeleton.parents[joint])
     while parent >= 0 and parent not in chosen:
         parent = int(skeleton.parents[parent])
     return None if parent < 0 else parent
 
 
-def _reach(
-    skeleton: Skeleton, parts: Sequence[BodyPart | None], children: list[list[int]], joint: int
-) -> float:
-    """How far the branch that begins at `joint` gets from where it hangs [m], at rest.
+def _reach(skeleton: Skeleton, parts: Sequence[BodyPart | None], joint: int) -> float:
+    """Distance [m] at rest from the parent of `joint` to the farthest joint of its branch.
 
-    Tips do not count: some exporters put end sites half a metre off.
+    Tips do not count: some exporters put end sites half a metre away.
     """
-    branch = [joint]
-    for member in branch:
-        branch.extend(children[member])
+    branch = skeleton.tree.subtree(joint)
     rest = skeleton.rest_positions
     moving = [member for member in branch if not ((part := parts[member]) and part.tip)]
     reach = np.linalg.norm(rest[moving] - rest[skeleton.parents[joint]], axis=1)
@@ -97,7 +88,7 @@ def _reach(
 
 
 def _is_trunk(part: BodyPart, hangs: bool) -> bool:
-    """Whether a part belongs to trunk or tail; `hangs`: the joint above is kept."""
+    """Whether a part belongs to trunk or tail; `hangs`: the parent joint is kept."""
     if part.kind is Kind.TAIL:
         return True
     if part.side is not Side.CENTRE or part.kind not in _TRUNK:
@@ -110,10 +101,10 @@ def _is_limb(part: BodyPart) -> bool:
 
 
 def _is_segment(part: BodyPart, there: set[tuple[Kind, Side]]) -> bool:
-    """Whether a second joint of the same part of a limb only divides its bone, to twist it.
+    """Whether a second joint of the same limb part only divides its bone, for twist.
 
-    So it is where names tell thigh from shin; where a spider's leg has seven joints all called leg,
-    each bends.
+    This holds where the names distinguish thigh and shin. In a spider's leg of seven joints that
+    are all called leg, each joint bends.
     """
     for whole_limb in (_ARM, _LEG):
         if part.kind in whole_limb:
@@ -122,7 +113,7 @@ def _is_segment(part: BodyPart, there: set[tuple[Kind, Side]]) -> bool:
 
 
 def _goes_on(parts: Sequence[BodyPart | None], joint: int, parent: int) -> bool:
-    """Whether a joint continues the trunk, wing or the like to which its kept parent belongs."""
+    """Whether a joint continues the trunk, wing or similar part of its kept parent."""
     part, upper = parts[joint], parts[parent]
     if part is None or upper is None:
         return part is upper
@@ -132,7 +123,7 @@ def _goes_on(parts: Sequence[BodyPart | None], joint: int, parent: int) -> bool:
 def _hand_ends(
     skeleton: Skeleton, parts: Sequence[BodyPart | None], kept: set[int]
 ) -> Iterable[int]:
-    """Where a hand is only a wrist so far: its own end, else the knuckle of a middle finger."""
+    """The end of a hand that has only a wrist so far: its own end, else a middle-finger knuckle."""
     rank = (Kind.HAND, Kind.MIDDLE, Kind.INDEX, Kind.FINGER, Kind.RING)
     for side in (Side.LEFT, Side.RIGHT):
         hands = [j for j in kept if (p := parts[j]) and p.kind is Kind.HAND and p.side is side]
@@ -152,7 +143,7 @@ def _hand_ends(
 
 
 def _points_on(skeleton: Skeleton, wrist: int, end: int) -> bool:
-    """Whether `end` goes on from the wrist like a hand; some exporters' end sites do not."""
+    """Whether `end` continues from the wrist like a hand; end sites of some exporters do not."""
     rest = skeleton.rest_positions
     forearm = rest[wrist] - rest[skeleton.parents[wrist]]
     hand = rest[end] - rest[wrist]
@@ -161,7 +152,7 @@ def _points_on(skeleton: Skeleton, wrist: int, end: int) -> bool:
 
 
 def _foot_ends(parts: Sequence[BodyPart | None]) -> Iterable[int]:
-    """Where a foot has no toes: its own end."""
+    """The end of a foot without toes."""
     toes = {part.side for part in parts if part is not None and part.kind is Kind.TOES}
     for joint, part in enumerate(parts):
         if part is not None and part.kind is Kind.FOOT and part.tip and part.side not in toes:
@@ -174,7 +165,7 @@ def _distance(skeleton: Skeleton, first: int, second: int) -> float:
 
 
 def _apart(skeleton: Skeleton, kept: set[int], size: float) -> set[int]:
-    """`kept` without joints that stand where the kept joint above them does."""
+    """Remove from `kept` the joints at the position of the kept joint above them."""
     apart: set[int] = set()
     for joint in skeleton.order:
         if joint in kept:

@@ -1,9 +1,9 @@
-"""Unity's space, which VMC, VRChat and Rokoko speak, and ours.
+"""Conversion between the coordinates of Unity (VMC, VRChat, Rokoko) and ours.
 
-Unity is left-handed with +Y up; whoever faces +Z has the left at -X. Ours is right-handed with the
-left at +X, so x is reflected. A rotation's axis is a pseudovector: reflected as a whole, its
-components across x change sign: (x, y, z, w) becomes (x, -y, -z, w). Both maps are their own
-inverse, so the same functions lead either way.
+Unity is left-handed with +Y up; a body that faces +Z has its left at -X. Ours is right-handed with
+the left at +X, so x is reflected. A rotation axis is a pseudovector: under the reflection its
+components across x change sign, so (x, y, z, w) becomes (x, -y, -z, w). Both maps are their own
+inverse, so the same functions convert in both directions.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ _ROTATION = np.array([1.0, -1.0, -1.0, 1.0])
 
 
 def across_unity(positions: ArrayLike) -> Array:
-    """Positions (..., 3) from Unity's space to ours, or back."""
+    """Convert positions (..., 3) from Unity's space to ours, or back."""
     reflected: Array = np.asarray(positions, dtype=np.float64) * _POSITION
     return reflected
 
 
 def turn_across_unity(quaternions: ArrayLike) -> Array:
-    """Rotations (..., 4) as (x, y, z, w) from Unity's space to ours, or back."""
+    """Convert rotations (..., 4) as (x, y, z, w) from Unity's space to ours, or back."""
     reflected: Array = np.asarray(quaternions, dtype=np.float64) * _ROTATION
     return reflected
 
 
 def unity_euler(degrees: ArrayLike) -> Array:
-    """Unity's Euler angles (..., 3) [degrees] about x, y, z as (x, y, z, w), in Unity's space.
+    """Convert Unity's Euler angles (..., 3) [degrees] about x, y, z to (x, y, z, w), Unity's space.
 
-    Unity turns about z first, then x, then y, each about the fixed axes: R = Ry Rx Rz.
+    Unity rotates about z first, then x, then y, each about the fixed axes: R = Ry Rx Rz.
     """
     half = np.radians(np.asarray(degrees, dtype=np.float64)) / 2.0
     turns = np.zeros((3, *half.shape[:-1], 4))

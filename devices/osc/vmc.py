@@ -257,8 +257,8 @@ class VmcDecoder:
             return True  # a tracker that nobody said the place of
         self._begin(COUNT + joint, arrival)
         bones = self._pose.bones
-        bones.held[joint] = True
-        bones.held_positions[joint], bones.held_rotations[joint] = pose
+        bones.pinned[joint] = True
+        bones.pinned_positions[joint], bones.pinned_rotations[joint] = pose
         return True
 
     def _on_bone(self, address: str, serial: str) -> int | None:

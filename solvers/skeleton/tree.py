@@ -10,6 +10,38 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 
+def children_of(parents: NDArray[np.int64]) -> tuple[tuple[int, ...], ...]:
+    """The children of each node, in ascending order, from `parents` (K,), -1 for a root."""
+    children: list[list[int]] = [[] for _ in parents]
+    for node, parent in enumerate(parents.tolist()):
+        if parent >= 0:
+            children[parent].append(node)
+    return tuple(map(tuple, children))
+
+
+def parents_first(parents: NDArray[np.int64]) -> tuple[int, ...]:
+    """The nodes of a tree with every parent before its children.
+
+    Args:
+        parents: (K,) index of each node's parent, -1 for the one root.
+
+    Raises:
+        ValueError: `parents` do not form one tree; the message completes "expected".
+    """
+    roots = np.flatnonzero(parents == -1)
+    if len(roots) != 1:
+        raise ValueError(f"exactly one root, got {len(roots)}")
+    if parents.min() < -1 or parents.max() >= len(parents):
+        raise ValueError("parents that form a tree")
+    children = children_of(parents)
+    order = roots.tolist()
+    for node in order:
+        order.extend(children[node])
+    if len(order) != len(parents):
+        raise ValueError("parents that form a tree")
+    return tuple(order)
+
+
 @dataclass(frozen=True, eq=False)
 class Tree:
     """Nodes joined by bones; rooted by `parents`, yet every query works on the unrooted tree too.
@@ -44,12 +76,10 @@ class Tree:
         positions.setflags(write=False)
         object.__setattr__(self, "parents", parents)
         object.__setattr__(self, "positions", positions)
-        if np.count_nonzero(parents == -1) != 1:
-            raise ValueError(
-                f"Expected exactly one root in `parents`, got {np.count_nonzero(parents == -1)}"
-            )
-        if parents.min() < -1 or parents.max() >= len(parents) or len(self.order) != len(parents):
-            raise ValueError("Expected `parents` to form a tree")
+        try:
+            parents_first(parents)
+        except ValueError as error:
+            raise ValueError(f"Expected {error}") from error
 
     def __len__(self) -> int:
         return len(self.parents)
@@ -62,11 +92,7 @@ class Tree:
     @cached_property
     def children(self) -> tuple[tuple[int, ...], ...]:
         """Each node's children, in ascending order."""
-        children: list[list[int]] = [[] for _ in self.parents]
-        for node, parent in enumerate(self.parents.tolist()):
-            if parent >= 0:
-                children[parent].append(node)
-        return tuple(map(tuple, children))
+        return children_of(self.parents)
 
     @cached_property
     def neighbours(self) -> tuple[tuple[int, ...], ...]:
@@ -79,10 +105,7 @@ class Tree:
     @cached_property
     def order(self) -> tuple[int, ...]:
         """The nodes with every parent before its children."""
-        order = [self.root]
-        for node in order:
-            order.extend(self.children[node])
-        return tuple(order)
+        return parents_first(self.parents)
 
     @cached_property
     def degree(self) -> NDArray[np.int64]:

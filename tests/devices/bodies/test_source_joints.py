@@ -247,9 +247,9 @@ def test_sources_are_named_by_beginnings_and_without_name_spaces() -> None:
 @pytest.mark.parametrize(
     ("source", "message"),
     [
-        ("Elbow", "stands for 2 joints: ElbowLeft, ElbowRight"),
-        ("wing", "is no joint of this performer; presets: whole, upper, arms"),
-        ("hand", "has no 'hand' to drive with; --source can be: whole, upper, arms"),
+        ("Elbow", "matches 2 joints: ElbowLeft, ElbowRight"),
+        ("wing", "is not a joint of this performer; presets: whole, upper, arms"),
+        ("hand", "has no 'hand'; --source can be: whole, upper, arms"),
         (" , ", "--source is empty"),
     ],
 )

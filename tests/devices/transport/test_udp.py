@@ -165,7 +165,7 @@ def test_what_is_no_host_and_port_is_one_line(url: str) -> None:
 @pytest.mark.parametrize(
     ("query", "why"),
     [
-        ("size=2", "'size' is not known to vmc://; there are: scale, role"),
+        ("size=2", "'size' is unknown to vmc://; known options: scale, role"),
         ("scale=0", "above 0"),
         ("scale=nan", "above 0"),
         ("scale=", "above 0"),

@@ -208,8 +208,8 @@ def test_a_slow_stream_is_synced_by_the_clock(tmp_path: Path) -> None:
 WRITER_TO_KILL = """
 import sys
 from pathlib import Path
-sys.path[:0] = [{root!r}, {here!r}]
-from test_mcap import ARM, arm_frame
+sys.path.insert(0, {root!r})
+from tests.replay.mcap.test_reader import ARM, arm_frame
 from replay.mcap.writer import McapWriter
 writer = McapWriter(Path(sys.argv[1]), ARM)
 for index in range(10**9):
@@ -222,8 +222,7 @@ for index in range(10**9):
 @pytest.mark.skipif(not hasattr(signal, "SIGKILL"), reason="needs kill -9")
 def test_a_killed_recorder_loses_less_than_a_second(tmp_path: Path) -> None:
     path = tmp_path / "killed.mcap"
-    here = Path(__file__).resolve()
-    code = WRITER_TO_KILL.format(root=str(here.parents[3]), here=str(here.parent))
+    code = WRITER_TO_KILL.format(root=str(Path(__file__).resolve().parents[3]))
     with subprocess.Popen(
         [sys.executable, "-c", code, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE
     ) as process:
