@@ -17,7 +17,6 @@ model for elastic deformations, for the energy with rims. Four things are added.
 from __future__ import annotations
 
 import math
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -31,10 +30,11 @@ from solvers.deform.arap_layout import (
     checked_targets,
     lay_out,
 )
+from solvers.deform.carried_parts import CarriedParts
 from solvers.deform.creases import Creases
-from solvers.deform.handle_influence import Following
-from solvers.deform.handle_motion import farthest_motion, fit_motions, follow, follow_one_group
-from solvers.deform.handles import checked_handles, nearest_groups, unheld
+from solvers.deform.handle_influence import HandleInfluence
+from solvers.deform.handle_motion import farthest_motion, follow
+from solvers.deform.handles import checked_handles
 from solvers.deform.rotation_fit import SCRATCH
 from solvers.deform.rotation_priors import (
     SMOOTHNESS,
@@ -42,6 +42,7 @@ from solvers.deform.rotation_priors import (
     fit_cells_near,
     turn_along,
 )
+from solvers.deform.solver_state import DeformationState
 from solvers.kernels.compiled import most_threads, threads_for
 from solvers.linear.constrained_system import ConstrainedSystem, Hold
 from solvers.linear.laplacian import Floats, Ints
@@ -104,9 +105,9 @@ class ArapSolver:
         self._rest = np.ascontiguousarray(self._frame.inside(points)[layout.order])
         self._mesh = build_cells(self._rest, layout.faces, energy)
         self._unit = float(self._mesh.laplacian.diagonal().mean()) or 1.0
-        self._carry()
+        self._carried = CarriedParts.of(self._rest, self._handles, layout)
         self._system = ConstrainedSystem(self._mesh.laplacian, layout.tree, self._held())
-        self._following = Following(self._system, self._handles)
+        self._influence = HandleInfluence(self._system, self._handles)
         count = len(points)
         smoothing = SMOOTHNESS * _area(self._rest, layout.faces)
         self._priors = RotationPriors(
@@ -123,6 +124,7 @@ class ArapSolver:
         self._from_rest = np.empty_like(self._rest)
         self._energy_terms = np.empty(len(self._mesh.terms.cells))
         self._goals = self._x[self._handles.places]
+        self._creases: Creases | None = None
 
     def hold(
         self,
@@ -147,9 +149,9 @@ class ArapSolver:
         _, old, kept = np.intersect1d(self._handles.places, new.places, return_indices=True)
         goals[kept] = self._goals[old]
         self._goals, self._handles = goals, new
-        self._carry()
+        self._carried = CarriedParts.of(self._rest, new, self._layout)
         self._system.hold(self._held())
-        self._following.hold(new)
+        self._influence.hold(new)
 
     def weigh(self, weights: ArrayLike) -> None:
         """Hold the same handles as firmly as `weights` (H,) say from now on.
@@ -159,7 +161,7 @@ class ArapSolver:
         """
         self._handles = self._handles.reweighted(weights)
         self._system.hold(self._held())
-        self._following.reweigh(self._handles)
+        self._influence.reweigh(self._handles)
 
     def stiffen(self, region_of: ArrayLike, rigidity: ArrayLike) -> None:
         """Name the parts of the surface that `stiffness` keeps from bending.
@@ -200,6 +202,48 @@ class ArapSolver:
         self._R[:] = _NO_TURN
         self._frames_since, self._has_moved, self._is_fresh = 0, False, True
         self._goals = self._x[self._handles.places]
+
+    def snapshot(self) -> DeformationState:
+        """Return what the next solve depends on, besides the settings: see `DeformationState`."""
+        return DeformationState(
+            self._x.copy(),
+            self._R.copy(),
+            self._handles,
+            self._goals,
+            self._system.precision,
+            self._influence.snapshot(),
+            self._frames_since,
+            self._has_moved,
+            self._is_fresh,
+            None if self._creases is None else self._creases.snapshot(),
+        )
+
+    def restore(self, state: DeformationState) -> None:
+        """Go back to a snapshot: the next solves give the same bytes as those after it did.
+
+        The handles of that time are held again, which factors the system if others are held now.
+        `iron` lays flat what the next solve gives.
+
+        Raises:
+            ValueError: a snapshot of a surface with another number of vertices; nothing changes.
+        """
+        if state.positions.shape != self._x.shape:
+            raise ValueError(
+                f"expected a state of {len(self._x)} vertices, got {len(state.positions)}"
+            )
+        if state.handles is not self._handles:
+            self._handles = state.handles
+            self._carried = CarriedParts.of(self._rest, self._handles, self._layout)
+            self._system.restore(self._held(), state.precision)
+        self._influence.restore(state.influence)
+        self._x[:], self._R[:], self._goals = state.positions, state.rotations, state.goals
+        self._shown = self._x
+        self._frames_since, self._has_moved = state.frames_since, state.has_moved
+        self._is_fresh = state.is_fresh
+        if state.creases is None:
+            self._creases = None
+        else:
+            self._made_creases().restore(state.creases)
 
     def solve(
         self, targets: ArrayLike, iterations: int = 1, *, out: Floats | None = None
@@ -261,14 +305,15 @@ class ArapSolver:
         frame, order = self._frame, self._layout.order
         self._from_rest[:] = self._shown
         with threads_for(len(order)):
-            folded = self._creases.iron(self._from_rest, self._R)
+            folded = self._made_creases().iron(self._from_rest, self._R)
         if folded:
             place_outside(self._from_rest, order, frame.centre, frame.size, answer)
         return folded
 
-    @cached_property
-    def _creases(self) -> Creases:
-        return Creases(self._rest, self._layout.faces, self._mesh.cells)
+    def _made_creases(self) -> Creases:
+        if self._creases is None:
+            self._creases = Creases(self._rest, self._layout.faces, self._mesh.cells)
+        return self._creases
 
     def rotations(self) -> Floats:
         """How each vertex's cell was turned by the last iteration, (N, 3, 3)."""
@@ -300,13 +345,13 @@ class ArapSolver:
 
     def _move_along(self, goals: Floats) -> None:
         """Put the start of this frame's iterations into x: hard handles at their goals, (H, 3)."""
-        following = self._following
-        following.advance()
-        step = following.motions(self._goals, goals)
-        angle, path = farthest_motion(step, self._goals, following.known)
-        follow(self._x, following.influences, step, self._x)
+        influence = self._influence
+        influence.advance()
+        step = influence.motions(self._goals, goals)
+        angle, path = farthest_motion(step, self._goals, influence.known)
+        follow(self._x, influence.influences, step, self._x)
         if self._priors.is_on:
-            turn_along(self._R, following.influences, step)
+            turn_along(self._R, influence.influences, step)
         self._goals = goals
         self._put_held(goals, self._x)
         self._frames_since += 1
@@ -322,14 +367,14 @@ class ArapSolver:
         self._frames_since, self._has_moved = 0, False
         if self._is_fresh:  # x is that already
             return
-        following, ties = self._following, self._priors.is_on
-        whole = following.motions(self._rest[self._handles.places], goals)
-        follow(self._rest, following.influences, whole, self._from_rest)
+        influence, ties = self._influence, self._priors.is_on
+        whole = influence.motions(self._rest[self._handles.places], goals)
+        follow(self._rest, influence.influences, whole, self._from_rest)
         self._put_held(goals, self._from_rest)
         if ties:  # rotations that depend on each other move along with their positions
             self._R, self._R_aside = self._R_aside, self._R
             self._R[:] = _NO_TURN
-            turn_along(self._R, following.influences, whole)
+            turn_along(self._R, influence.influences, whole)
         fresh = self._energy_of(self._from_rest)
         if ties:
             self._R, self._R_aside = self._R_aside, self._R
@@ -342,12 +387,7 @@ class ArapSolver:
         """Put what is not free into x: hard handles at their goals, carried parts beside theirs."""
         handles = self._handles
         x[handles.places[handles.hard]] = goals[handles.hard]
-        if len(self._carried):
-            rest = self._rest
-            whole = fit_motions(rest[handles.places], goals, handles.group_of, handles.count)
-            moved = np.empty((len(self._carried), 3))
-            follow(rest[self._carried], self._carriers, whole, moved)
-            x[self._carried] = moved
+        self._carried.move(self._rest, handles, goals, x)
 
     def _energy_of(self, x: Floats) -> float:
         """The energy of x and of the rotations that the next local step finds for it."""
@@ -358,17 +398,10 @@ class ArapSolver:
         energy_terms(x, self._R, self._rest, self._mesh.terms, self._energy_terms)
         return float(self._energy_terms.sum())
 
-    def _carry(self) -> None:
-        """Find what no handle touches, and whom it goes along with."""
-        self._carried = unheld(self._handles, self._layout)
-        self._carriers = follow_one_group(
-            nearest_groups(self._rest, self._carried, self._handles, self._layout.parts)
-        )
-
     def _held(self) -> Hold:
         handles = self._handles
         fixed = np.zeros(len(self._rest), dtype=np.bool_)
-        fixed[self._carried] = True
+        fixed[self._carried.places] = True
         fixed[handles.places[handles.hard]] = True
         stiffness = np.zeros(len(self._rest))
         stiffness[handles.places] = np.where(handles.hard, 0.0, handles.weights) * self._unit

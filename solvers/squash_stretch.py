@@ -23,12 +23,15 @@ Where the paper is left, and why:
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike
 
 from solvers.arap import ArapSolver
 from solvers.deform.arap_cells import SPOKES
 from solvers.deform.closed_shells import build_shell
+from solvers.deform.solver_state import DeformationState
 from solvers.deform.squash_kernels import (
     Fit,
     Planes,
@@ -143,6 +146,21 @@ class SquashStretchSolver(ArapSolver):
         """Forget the last answer: the next solve starts from the rest pose."""
         super().reset()
         self._cell_scales[:] = 1.0
+
+    def snapshot(self) -> DeformationState:
+        """Return what the next solve depends on, as of `ArapSolver.snapshot`.
+
+        The pose state is found anew in each frame and is no part of it.
+        """
+        return replace(super().snapshot(), cell_scales=self._cell_scales.copy())
+
+    def restore(self, state: DeformationState) -> None:
+        """Go back to a snapshot, as of `ArapSolver.restore`.
+
+        `scales` and `cell_matrices` are those of the next solve.
+        """
+        super().restore(state)
+        self._cell_scales[:] = 1.0 if state.cell_scales is None else state.cell_scales
 
     @property
     def energy(self) -> float:

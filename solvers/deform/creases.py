@@ -14,6 +14,7 @@ are; see `runtime.output.report.watchdog`.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -50,6 +51,14 @@ class Moving(NamedTuple):
     members: Ints
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class CreasesState:
+    """Which triangles (F,) are known to be folded, and which part of them was looked at last."""
+
+    folded: Bools
+    part: int
+
+
 class Creases:
     """Lays flat the folded triangles of one surface.
 
@@ -73,6 +82,14 @@ class Creases:
         self._folded = np.zeros(len(faces), np.bool_)
         self._part = 0
         self._moving = Moving(np.zeros(len(rest), np.bool_), np.zeros(len(rest), np.int64))
+
+    def snapshot(self) -> CreasesState:
+        """Return which triangles are known to be folded."""
+        return CreasesState(self._folded.copy(), self._part)
+
+    def restore(self, state: CreasesState) -> None:
+        """Go back to a snapshot of the same surface."""
+        self._folded[:], self._part = state.folded, state.part
 
     def iron(self, x: Floats, R: Floats) -> int:
         """Lay flat in x (N, 3) what is folded under cell turns R (N, 9), handles or not.

@@ -8,6 +8,8 @@ that no frame waits for them; nothing depends on how fast the machine is.
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -20,7 +22,42 @@ from solvers.linear.laplacian import Floats, Ints
 ROUNDS = 1  # of three groups each, in a tick
 
 
-class Following:
+@dataclass(frozen=True, slots=True, eq=False)
+class HandleInfluenceState:
+    """The influences at one moment, and how far the search for new ones has come.
+
+    Attributes:
+        influences, known: as of `HandleInfluence`.
+        count: the groups that `influences` names.
+        group_at: (N,) the group at each vertex in the numbers of `influences`, -1 for none.
+        handles: the handles whose influences are being found.
+        latest: those handles with their newest weights.
+        changed: whether the weights changed while the search went on.
+        next_group: the first group that is still to be found.
+        new_group_at: (N,) the group of `handles` at each vertex, -1 for none.
+        groups: (N, KEPT) the groups that were found so far.
+        weights: (N, KEPT) their shares.
+    """
+
+    influences: Influences
+    known: Ints
+    count: int
+    group_at: Ints
+    handles: Handles
+    latest: Handles
+    changed: bool
+    next_group: int
+    new_group_at: Ints
+    groups: NDArray[np.uint32]
+    weights: Floats
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether all groups were found; nothing writes to `groups` and `weights` then."""
+        return self.next_group >= self.handles.count
+
+
+class HandleInfluence:
     """Finds which groups of handles a surface's vertices follow.
 
     Args:
@@ -57,6 +94,33 @@ class Following:
         if self._next >= self._handles.count:
             self._begin(handles)
         self._latest = handles
+
+    def snapshot(self) -> HandleInfluenceState:
+        """Return the influences and the state of the search; only what may change is copied."""
+        state = HandleInfluenceState(
+            self.influences,
+            self.known,
+            self._count,
+            self._group_at,
+            self._handles,
+            self._latest,
+            self._changed,
+            self._next,
+            self._new_group_at,
+            self._groups,
+            self._weights,
+        )
+        return state if state.is_complete else _with_copies(state)
+
+    def restore(self, state: HandleInfluenceState) -> None:
+        """Go back to a snapshot; the system must be held as it was then."""
+        if not state.is_complete:
+            state = _with_copies(state)
+        self.influences, self.known = state.influences, state.known
+        self._count, self._group_at = state.count, state.group_at
+        self._handles, self._latest, self._changed = state.handles, state.latest, state.changed
+        self._next, self._new_group_at = state.next_group, state.new_group_at
+        self._groups, self._weights = state.groups, state.weights
 
     def advance(self) -> None:
         """Find a few of the shares that are not known yet."""
@@ -95,6 +159,10 @@ class Following:
             self.known = self._group_at[self._handles.places]
             if self._changed:
                 self._begin(self._latest)
+
+
+def _with_copies(state: HandleInfluenceState) -> HandleInfluenceState:
+    return replace(state, groups=state.groups.copy(), weights=state.weights.copy())
 
 
 @kernel

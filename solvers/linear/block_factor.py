@@ -115,7 +115,7 @@ class BlockFactor:
         starts, columns = self._matrix.indptr.astype(np.int32), self._matrix.indices
         self._entries = Entries(starts, columns.astype(np.int32), self._matrix.data)
         self._plan, self._schedule, self._updates = _plan(self._entries, tree)
-        self._fill(np.float32)
+        self._fill(np.dtype(np.float32))
 
     def refactor(self, values: Floats) -> None:
         """Take other values for the matrix's entries, in the order of its compressed rows.
@@ -128,6 +128,19 @@ class BlockFactor:
             _factorise(self._entries, stale, self._blocks, self._schedule, self._updates)
             self._check(rounds=1)
 
+    def restore(self, values: Floats, precision: np.dtype[Any]) -> None:
+        """Factor these values as `refactor` does, with numbers of the precision of an earlier time.
+
+        The precision is not tested again: it depends on all the values since the first.
+        """
+        stale = _stale_tasks(self._entries, values, self._blocks, self._schedule)
+        self._entries.values[:] = values
+        if precision != self.precision:
+            self._make_room(precision)
+            stale[:] = True
+        with one_blas_thread():
+            _factorise(self._entries, stale, self._blocks, self._schedule, self._updates)
+
     def add_solution(self, b: Floats, x: Floats) -> None:
         """Add the solution y of A y = b, both (n, 3), to the first n rows of x."""
         _add_solution(self._blocks, self._schedule, b, x, self._work)
@@ -138,11 +151,16 @@ class BlockFactor:
         self.add_solution(b, x)
 
     @property
+    def precision(self) -> np.dtype[Any]:
+        """The type of the factor's numbers."""
+        return self._blocks.ups.dtype
+
+    @property
     def nbytes(self) -> int:
         """The bytes that a solve reads of the factor."""
         return self._blocks.ups.nbytes + self._blocks.downs.nbytes + 2 * self._blocks.reach.nbytes
 
-    def _fill(self, precision: type[np.floating[Any]]) -> None:
+    def _make_room(self, precision: np.dtype[Any]) -> None:
         plan, schedule = self._plan, self._schedule
         ups = np.zeros(plan.up_starts[-1], precision)
         downs = np.zeros(plan.down_starts[0], precision)
@@ -152,9 +170,12 @@ class BlockFactor:
             np.zeros((self._matrix.shape[0] + tasks * len(schedule.shared), 3), precision),
             np.zeros((tasks + 1, 3, schedule.widest), precision),
         )
-        every = np.ones(tasks, np.bool_)
+
+    def _fill(self, precision: np.dtype[Any]) -> None:
+        self._make_room(precision)
+        every = np.ones(len(self._schedule.task_firsts), np.bool_)
         with one_blas_thread():
-            _factorise(self._entries, every, self._blocks, schedule, self._updates)
+            _factorise(self._entries, every, self._blocks, self._schedule, self._updates)
             self._check(rounds=3)
 
     def _check(self, rounds: int) -> None:
@@ -162,7 +183,7 @@ class BlockFactor:
         if self._blocks.ups.dtype == np.float64:
             return
         if _lost_share(self._matrix, self, rounds) > _LOST_MOST:
-            self._fill(np.float64)
+            self._fill(np.dtype(np.float64))
 
 
 def _plan(entries: Entries, tree: Dissection) -> tuple[Blocks, Schedule, Updates]:

@@ -9,7 +9,7 @@ only the subtrees that are concerned.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -56,6 +56,16 @@ class ConstrainedSystem:
         """Be held otherwise from now on."""
         self.held = held
         self._factor.refactor(_held_values(self._entries, held))
+
+    @property
+    def precision(self) -> np.dtype[Any]:
+        """The type of the factor's numbers; what held the system before may have decided it."""
+        return self._factor.precision
+
+    def restore(self, held: Hold, precision: np.dtype[Any]) -> None:
+        """Be held as at an earlier time, when the factor had this precision."""
+        self.held = held
+        self._factor.restore(_held_values(self._entries, held), precision)
 
     def add_solution(self, b: Floats, x: Floats) -> None:
         """Add to x (N, 3) the correction that b (N, 3) asks for."""

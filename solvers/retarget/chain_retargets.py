@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +28,19 @@ class _Chains(NamedTuple):
     bones: Ints  # (S, 2)
     shares: Array  # (S,)
     changes: Array  # (D, 3, 3)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ChainRetargetsState:
+    """What the next frame's rotations depend on, besides the pose.
+
+    Attributes:
+        turns: (B, 4) each source bone's turn against its predecessor, zero before the first frame.
+        last: (B, 3) each source bone's direction, as its predecessor carries it.
+    """
+
+    turns: Array
+    last: Array
 
 
 class ChainRetargets:
@@ -64,6 +78,22 @@ class ChainRetargets:
     def reset(self) -> None:
         """Forget the last frame, as after a cut."""
         self._turns[:] = 0.0
+
+    def snapshot(self) -> ChainRetargetsState:
+        """Return a copy of what the last frame left behind."""
+        return ChainRetargetsState(self._turns.copy(), self._last.copy())
+
+    def restore(self, state: ChainRetargetsState) -> None:
+        """Go back to a snapshot of retargets with the same maps.
+
+        Raises:
+            ValueError: a snapshot of another number of bones.
+        """
+        if state.turns.shape != self._turns.shape:
+            raise ValueError(
+                f"expected a state of {len(self._turns)} bones, got {len(state.turns)}"
+            )
+        self._turns[:], self._last[:] = state.turns, state.last
 
     def rotations(self, body: Array, gains: Array) -> Array:
         """World rotations (S, 4) of all target bones from rest, chain after chain.

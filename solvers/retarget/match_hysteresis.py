@@ -3,8 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from solvers.matching import Match
+
+
+@dataclass(frozen=True, slots=True)
+class MatchHysteresisState:
+    """Which match is shown, and since when another one is better.
+
+    Attributes:
+        shown: the match that is shown, None before there was any.
+        ranked: the last frame's matches, best first.
+        since: [s] when another match began to be better by the margin, None while none is.
+        pinned: whether a match was chosen by hand.
+    """
+
+    shown: Match | None
+    ranked: tuple[Match, ...]
+    since: float | None
+    pinned: bool
 
 
 class MatchHysteresis:
@@ -29,6 +47,15 @@ class MatchHysteresis:
     def shown(self) -> Match | None:
         """The match to show; None before there was any."""
         return self._shown
+
+    def snapshot(self) -> MatchHysteresisState:
+        """Return what the next update depends on."""
+        return MatchHysteresisState(self._shown, self._ranked, self._since, self.pinned)
+
+    def restore(self, state: MatchHysteresisState) -> None:
+        """Go back to a snapshot; rank, margin and hold stay as they are."""
+        self._shown, self._ranked = state.shown, state.ranked
+        self._since, self.pinned = state.since, state.pinned
 
     def update(self, ranked: Sequence[Match], time: float) -> Match | None:
         """Take a frame's matches, best first, at `time` [s]; the match to show, with its new score.

@@ -7,6 +7,7 @@ level as long as the feet have stood at one place only, where any slope would fi
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,15 @@ Array = NDArray[np.float64]
 MEMORY = 10.0  # [s] after which a step counts half
 STIFFNESS = 0.5  # [s m^2] of standing a metre away that tilts as much as the level floor holds
 STEEPEST = 0.6  # slope, about 30 degrees; what is steeper was no floor
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FloorState:
+    """The sums of a floor fit at one moment: normal equations (3, 3), (3,), and weight [s]."""
+
+    normal: Array
+    right: Array
+    weight: float
 
 
 class FloorFit:
@@ -37,6 +47,14 @@ class FloorFit:
         keep = 0.5 ** (dt / MEMORY)
         _add(self._normal, self._right, points, keep, dt)
         self.weight = keep * self.weight + dt * len(points)
+
+    def snapshot(self) -> FloorState:
+        """Return a copy of the fit's sums."""
+        return FloorState(self._normal.copy(), self._right.copy(), self.weight)
+
+    def restore(self, state: FloorState) -> None:
+        """Go back to a snapshot."""
+        self._normal[:], self._right[:], self.weight = state.normal, state.right, state.weight
 
     def plane(self) -> tuple[float, float, float]:
         """The slopes along x and z and the height [m] at the origin; level at 0 before any step."""

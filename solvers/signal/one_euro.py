@@ -8,6 +8,8 @@ axes lie.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -43,6 +45,13 @@ def smoothing_factor(cutoff: float, dt: float) -> float:
     return 1.0 / (1.0 + 1.0 / (2.0 * np.pi * dt * cutoff))
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class OneEuroState:
+    """The memory of a filter at one moment: an array of `_POINT` (n,), None before any sample."""
+
+    points: NDArray[np.void] | None
+
+
 class OneEuroFilter:
     """Smooths points that come one sample at a time.
 
@@ -75,6 +84,14 @@ class OneEuroFilter:
     def reset(self) -> None:
         """Forget every sample; the next one comes out as it is."""
         self._points = None
+
+    def snapshot(self) -> OneEuroState:
+        """Return a copy of the filter's memory."""
+        return OneEuroState(None if self._points is None else self._points.copy())
+
+    def restore(self, state: OneEuroState) -> None:
+        """Go back to a snapshot; the number of points may differ from the current one."""
+        self._points = None if state.points is None else state.points.copy()
 
     def filter(self, points: Array, dt: float) -> Array:
         """Points (n, 3) [m], smoothed.

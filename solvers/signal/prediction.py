@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,6 +15,21 @@ Array = NDArray[np.float64]
 VELOCITY_CUTOFF = 6.0  # [Hz]
 GOES_ON = 0.7  # share of the velocity that is expected to go on
 MOST = 1.0 / 30.0  # [s] ahead
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PredictorState:
+    """The memory of a predictor at one moment.
+
+    Attributes:
+        before: (n, 3) [m] the last sample, None before any.
+        velocity: (n, 3) [m/s] smoothed, None before any sample.
+        step: [s] by which the last answer lay ahead.
+    """
+
+    before: Array | None
+    velocity: Array | None
+    step: float
 
 
 class Predictor:
@@ -29,6 +46,15 @@ class Predictor:
         self._before: Array | None = None
         self._velocity: Array | None = None
         self._step = 0.0
+
+    def snapshot(self) -> PredictorState:
+        """Return a copy of the predictor's memory."""
+        return PredictorState(_copied(self._before), _copied(self._velocity), self._step)
+
+    def restore(self, state: PredictorState) -> None:
+        """Go back to a snapshot; the number of points may differ from the current one."""
+        self._before, self._velocity = _copied(state.before), _copied(state.velocity)
+        self._step = state.step
 
     def predict(self, points: Array, dt: float) -> Array:
         """Points (n, 3) [m] as they will be one step later.
@@ -50,6 +76,10 @@ class Predictor:
         self._before[:] = points
         ahead: Array = points + self._velocity * (GOES_ON * self._step)
         return ahead
+
+
+def _copied(points: Array | None) -> Array | None:
+    return None if points is None else points.copy()
 
 
 @kernel

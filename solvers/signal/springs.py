@@ -7,6 +7,7 @@ step is stable and two short steps are one long one.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -14,6 +15,14 @@ from numpy.typing import ArrayLike, NDArray
 from solvers.kernels.compiled import kernel
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SpringsState:
+    """Positions (n,) and speeds (n,) [1/s] of springs at one moment."""
+
+    at: Array
+    speed: Array
 
 
 class Springs:
@@ -34,6 +43,14 @@ class Springs:
         self.speed: Array = np.zeros_like(self.at)
         self._omega = 2.0 * math.pi * frequency
         self._damping = damping
+
+    def snapshot(self) -> SpringsState:
+        """Return a copy of the current positions and speeds."""
+        return SpringsState(self.at.copy(), self.speed.copy())
+
+    def restore(self, state: SpringsState) -> None:
+        """Go back to a snapshot of as many springs."""
+        self.at[:], self.speed[:] = state.at, state.speed
 
     def step(self, target: ArrayLike, seconds: float) -> Array:
         """Where they are (n,) after `seconds` [s] of being pulled to `target` (n,).

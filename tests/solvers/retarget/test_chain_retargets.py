@@ -66,6 +66,20 @@ def test_a_gain_makes_the_turns_of_its_own_chain_smaller() -> None:
     np.testing.assert_allclose(vectors[1], 0.25 * vectors[0], atol=1e-12)
 
 
+def test_going_on_from_a_snapshot_gives_the_same_bytes() -> None:
+    moving, retargets = poses(8), ChainRetargets(maps(), SOURCES)
+    for pose in moving[:4]:
+        retargets.rotations(pose, FULL)
+    state = retargets.snapshot()
+    expected = [retargets.rotations(pose, FULL).tobytes() for pose in moving[4:]]
+    other = ChainRetargets(maps(), SOURCES)
+    for restored in (retargets, other, other):
+        restored.restore(state)
+        assert [restored.rotations(pose, FULL).tobytes() for pose in moving[4:]] == expected
+    with pytest.raises(ValueError, match="expected a state of 0 bones, got 6"):
+        ChainRetargets((), ()).restore(state)
+
+
 def test_a_body_may_have_no_chains() -> None:
     assert ChainRetargets((), ()).rotations(REST, np.ones(0)).shape == (0, 4)
 

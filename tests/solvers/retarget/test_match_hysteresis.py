@@ -108,3 +108,27 @@ def test_a_noisy_arm_that_sweeps_past_two_tentacles_flips_the_match_once(seed):
     flips = sum(a != b for a, b in pairwise(seen))
     assert sum(a != b for a, b in pairwise(raw)) > 1
     assert flips == 1
+
+
+def test_going_on_from_a_snapshot_shows_the_same_matches():
+    h = MatchHysteresis(margin=0.2, hold=0.5)
+    h.update(ranked(a=1.0, b=0.9), 0.0)
+    h.update(ranked(a=1.0, b=1.3), 1.0)  # the wait has begun
+    state = h.snapshot()
+
+    def go_on():
+        seen = []
+        for time in (1.4, 1.6, 1.8):
+            h.update(ranked(a=1.0, b=1.3), time)
+            seen.append(shown(h))
+        return seen
+
+    assert go_on() == ["a", "b", "b"]
+    h.cycle(1)  # pins another
+    h.restore(state)
+    assert not h.pinned
+    assert go_on() == ["a", "b", "b"]
+    h.update(ranked(c=1.0), 9.0)
+    h.restore(state)
+    h.cycle(1)
+    assert shown(h) == "b"  # the matches of the snapshot's frame are known again

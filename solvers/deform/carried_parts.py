@@ -1,0 +1,39 @@
+"""The parts of a surface that no handle touches: the nearest group of handles carries them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from solvers.deform.arap_layout import Layout
+from solvers.deform.handle_motion import Influences, fit_motions, follow, follow_one_group
+from solvers.deform.handles import Handles, nearest_groups, unheld
+from solvers.linear.laplacian import Floats, Ints
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CarriedParts:
+    """Components without a handle, and vertices without a face.
+
+    Attributes:
+        places: (C,) their vertices, in the solver's order.
+        carriers: the one group that each vertex follows.
+    """
+
+    places: Ints
+    carriers: Influences
+
+    @classmethod
+    def of(cls, rest: Floats, handles: Handles, layout: Layout) -> CarriedParts:
+        """Find them on a surface with rest positions (N, 3)."""
+        places = unheld(handles, layout)
+        return cls(places, follow_one_group(nearest_groups(rest, places, handles, layout.parts)))
+
+    def move(self, rest: Floats, handles: Handles, goals: Floats, x: Floats) -> None:
+        """Put them into x (N, 3), moved rigidly from rest as the handles are to `goals` (H, 3)."""
+        if len(self.places):
+            whole = fit_motions(rest[handles.places], goals, handles.group_of, handles.count)
+            moved = np.empty((len(self.places), 3))
+            follow(rest[self.places], self.carriers, whole, moved)
+            x[self.places] = moved
