@@ -22,8 +22,9 @@ from runtime.characters.builtin import BUILTIN
 from runtime.characters.character import Character
 from runtime.characters.open_character import load_character
 from runtime.conditioning.switches import for_recording
-from runtime.driving.match_session import Choices, MatchSession
+from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer
+from runtime.driving.puppet_match import Choices
 from runtime.driving.rehearsal import rehearse
 from runtime.output.report.report import Report
 from runtime.puppet.puppet import Puppet

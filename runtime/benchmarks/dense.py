@@ -21,8 +21,9 @@ from replay.recording import Recording
 from runtime.characters.builtin import builtin_character
 from runtime.characters.character import Character
 from runtime.characters.proxy import DENSE, PROXY, Proxy, proxy_of
-from runtime.driving.match_session import Choices, MatchSession
+from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer
+from runtime.driving.puppet_match import Choices
 from runtime.driving.rehearsal import rehearse
 from runtime.puppet.puppet import Puppet
 from runtime.render.camera import front_camera
@@ -161,7 +162,7 @@ def _perform(character: Character, proxy: Proxy, recording: Recording, frames: i
         performer, [puppet], lambda: camera.view_rotation, Choices(), [None]
     )
     rehearse(recording, "whole", match_session)
-    binding = puppet.binding
+    binding = puppet.bound_skeleton.binding
     targets = []
     for index in range(0, len(recording), STEP)[:frames]:
         puppet.follow(performer.follow(recording.frame(index)))

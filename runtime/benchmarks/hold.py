@@ -45,7 +45,7 @@ def run() -> dict[str, object]:
 
 def _measure(name: str) -> dict[str, Any]:
     character = load_character(name)
-    binding = Puppet(character).binding
+    binding = Puppet(character).bound_skeleton.binding
     handles, anchors = binding.handles, binding.anchor
     rest = character.vertices
     solver = ArapSolver(rest, character.faces, handles, groups=anchors)

@@ -23,8 +23,9 @@ from devices.transport.live_stream import LiveStream
 from devices.transport.udp import UdpTransport
 from runtime.characters.builtin import builtin_character
 from runtime.conditioning.switches import for_live
-from runtime.driving.match_session import Choices, MatchSession
+from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer, Pose
+from runtime.driving.puppet_match import Choices
 from runtime.output.report.report import Report
 from runtime.puppet.puppet import Motion, Puppet
 from runtime.render.context import headless_context, is_software, release_headless

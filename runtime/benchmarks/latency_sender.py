@@ -73,7 +73,7 @@ def _by_vmc(played: MotionClip, port: int, closing: ExitStack) -> Send:
 
     def send(frame: SkeletonFrame) -> None:
         performer.follow(frame)
-        sender.write(PerformedFrame(0, frame.time, _NOTHING, _NOTHING, np.zeros((0, 4))))
+        sender.write(PerformedFrame(0, frame.time, _NOTHING, None))
 
     return send
 

@@ -21,8 +21,9 @@ from runtime.benchmarks.memory import resident_memory
 from runtime.benchmarks.stolen_time import JIFFY, stolen_time
 from runtime.characters.builtin import builtin_character
 from runtime.conditioning.switches import for_live
-from runtime.driving.match_session import Choices, MatchSession
+from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer
+from runtime.driving.puppet_match import Choices
 from runtime.output.report.report import Report
 from runtime.puppet.puppet import Puppet
 from runtime.render.camera import front_camera

@@ -5,8 +5,9 @@ from __future__ import annotations
 from replay.builtin import builtin_recording
 from replay.player import EveryFrame, Player
 from runtime.characters.builtin import BUILTIN, builtin_character
-from runtime.driving.match_session import Choices, MatchSession
+from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer
+from runtime.driving.puppet_match import Choices
 from runtime.output.report.report import Report
 from runtime.puppet.puppet import Puppet
 from runtime.render.camera import front_camera

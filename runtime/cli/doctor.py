@@ -9,6 +9,7 @@ import platform
 import socket
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -26,8 +27,9 @@ from runtime.characters.builtin import BUILTIN, builtin_character
 from runtime.characters.cache import cache_folder
 from runtime.characters.proxy import proxy_of
 from runtime.cli.devices import listening_ports
-from runtime.driving.match_session import Choices, MatchSession
+from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer
+from runtime.driving.puppet_match import Choices
 from runtime.output.files.video import encoder_for
 from runtime.output.report.report import Report
 from runtime.puppet.deformable_surface import Elasticity
@@ -189,8 +191,9 @@ def _warm() -> None:
     BridgeReceiver(LATEST)
     proxy_of(puppets[0].character, dense=0, count=1_000)  # as for a dense character
     puppets[0].surface.elasticity = Elasticity(cartoon=1.0, volume_gain=1.5, stiffness=0.5)
-    anchors = len(puppets[1].binding.node)
-    puppets[1].surface.weigh(np.ones(anchors))  # as of a limb that lets go
+    rest = puppets[1].bound_skeleton.rest_targets
+    released = replace(rest, weights=np.ones_like(rest.weights))  # as of a limb that lets go
+    puppets[1].surface.deform(released, 1)
     context = headless_context()
     scene = Scene(context, (320, 180), puppets, recording.skeleton)
     report = Report(None)

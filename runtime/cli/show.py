@@ -33,8 +33,9 @@ from runtime.control.keys import WindowControls
 from runtime.control.remote import PORT, Remote
 from runtime.control.window import Window
 from runtime.driving.mapping import Mapping, read_mapping
-from runtime.driving.match_session import Choices, MatchSession
+from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer
+from runtime.driving.puppet_match import Choices
 from runtime.driving.rehearsal import rehearse
 from runtime.output.report.report import Report
 from runtime.puppet.deformable_surface import Elasticity
@@ -352,8 +353,9 @@ class _Show:
         else:
             frames, seconds = len(recording), recording.seconds
         self._report.recorded(frames=frames, joints=len(skeleton.names), seconds=seconds)
-        for part, puppet in zip(self._parts, self._puppets, strict=True):
-            part.matched(puppet.mapping, skeleton)
+        mappings = [mapping for act in self._acts for mapping in act.match_session.mappings]
+        for part, mapping in zip(self._parts, mappings, strict=True):
+            part.matched(mapping, skeleton)
 
 
 def _milliseconds(seconds: float) -> str:

@@ -60,8 +60,13 @@ class Exaggeration:
 
     def __init__(self, lengths: Array, height: float) -> None:
         self._sizes = np.maximum(np.append(lengths, height), 1e-9)
-        self._springs = Springs(np.zeros(len(lengths) + 1), frequency=FREQUENCY, damping=DAMPING)
+        self._springs = _springs(len(self._sizes))
         self._before: tuple[float, Array, float] | None = None
+
+    def reset(self) -> None:
+        """Forget how the character moved."""
+        self._springs = _springs(len(self._sizes))
+        self._before = None
 
     def strain(self, time: float, tips: Array, lift: float, amount: float) -> Strain:
         """How far the character is stretched at a moment.
@@ -82,6 +87,10 @@ class Exaggeration:
             self._springs.step(pulls, passed)
         lengths = 1.0 + amount * self._springs.at
         return Strain(lengths[:-1], float(lengths[-1]))
+
+
+def _springs(count: int) -> Springs:
+    return Springs(np.zeros(count), frequency=FREQUENCY, damping=DAMPING)
 
 
 @kernel

@@ -35,9 +35,14 @@ class LimbRelease:
     """
 
     def __init__(self, count: int) -> None:
-        self.weights: Array = np.full(count, HARD)
-        self._firmness = np.ones(count)
-        self._unseen = np.zeros(count)
+        self._count = count
+        self.reset()
+
+    def reset(self) -> None:
+        """Hold every limb firmly, as in the beginning."""
+        self.weights: Array = np.full(self._count, HARD)
+        self._firmness = np.ones(self._count)
+        self._unseen = np.zeros(self._count)
         self._is_firm = True  # every limb, and seen
         self._time = math.nan
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from devices.bodies.joint_labels import heading_joints, hips_joint, label_joints
 from devices.bodies.joint_names import Kind
-from devices.bodies.source_joints import available_presets, source_joints, source_tree
+from devices.bodies.source_joints import source_joints, source_tree
 from devices.skeleton import Skeleton, SkeletonFrame
 from runtime.conditioning.conditioner import Conditioner, warm
 from runtime.conditioning.mirror import mirrored
@@ -93,7 +93,6 @@ class Performer:
     Attributes:
         skeleton: the performer's whole skeleton.
         joints: the joints that may drive a character, as chosen by `source`.
-        legs: the joints of each leg, empty for a performer without any.
         pose: the newest pose; None before the first frame.
 
     Raises:
@@ -108,12 +107,6 @@ class Performer:
     ) -> None:
         self.skeleton = skeleton
         self._parents, self.joints = source_tree(skeleton, source_joints(skeleton, source))
-        there = available_presets(skeleton)
-        self.legs = [
-            frozenset(source_joints(skeleton, leg))
-            for leg in ("left-leg", "right-leg")
-            if leg in there
-        ]
         self._pairs = np.array(heading_joints(skeleton), dtype=np.int64).reshape(-1, 2)
         self._hips = hips_joint(skeleton)
         self._parts = label_joints(skeleton)

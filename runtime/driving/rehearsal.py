@@ -1,4 +1,4 @@
-"""Before a recording is played: a look through it for the poses that suit the puppets best."""
+"""Looks through a recording before it is played, for the poses that suit the puppets best."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from runtime.driving.performer import Performer
 
 Array = NDArray[np.float64]
 
-POSES = 500  # looked at, evenly through the recording
+POSES = 500  # evenly through the recording
 LED_THERE = 8  # frames that are followed up to each of them
 
 
@@ -23,18 +23,18 @@ def rehearse(
     conditioning: Conditioning | None = None,
     part: int = 0,
 ) -> Array | None:
-    """Let the director choose matches and rest states from poses of the whole recording.
+    """Let a match session choose matches and rest states from poses of the whole recording.
 
-    Where hardly a joint is ever in view nothing is chosen; the director then matches as it would
-    live.
+    Where too few joints are in view in every pose, nothing is chosen; the session then matches as
+    it does live.
 
     Args:
         recording: what will be played.
         source: the part of the performer that drives, as for `Performer`.
-        director: who chooses.
+        match_session: chooses.
         conditioning: what is done to the frames first, as for `Performer`, so that no glitch of
             the sensor is taken for a pose.
-        part: which performer, by the order in which they come; 0 is the lead.
+        part: which performer, in the order in which they appear, from 0.
 
     Returns:
         (A, 2, 3) [m] for each puppet the corners of all that it fills, for the camera; None when
@@ -43,19 +43,20 @@ def rehearse(
     who, first = np.unique(recording.performers, return_index=True)
     if part >= len(who):
         return None
-    lead = np.flatnonzero(recording.performers == who[np.argsort(first)[part]])
-    chosen = np.unique(np.linspace(0, len(lead) - 1, POSES).round().astype(int))
+    own = np.flatnonzero(recording.performers == who[np.argsort(first)[part]])
+    chosen = np.unique(np.linspace(0, len(own) - 1, POSES).round().astype(int))
+    followed = np.arange(len(own)) if match_session.needs_clip else _leading_to(chosen)
     performer = Performer(recording.skeleton, source, conditioning)
-    poses = []
-    for index in _with_what_leads_there(chosen).tolist():
-        frame = recording.frame(int(lead[index]))
-        pose = performer.follow(frame)
+    poses, clip = [], []
+    for index in followed.tolist():
+        frame = recording.frame(int(own[index]))
+        clip.append(performer.follow(frame))
         if index in chosen and match_session.sees(frame):
-            poses.append(pose)
-    return match_session.rehearse(poses) if poses else None
+            poses.append(clip[-1])
+    return match_session.rehearse(poses, clip) if poses else None
 
 
-def _with_what_leads_there(chosen: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Frames and those before them, by which a glitch is told from a pose."""
+def _leading_to(chosen: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The chosen frames and those before each, by which a glitch is told from a pose."""
     led = (chosen[:, None] - np.arange(LED_THERE)).ravel()
     return np.unique(led[led >= 0])

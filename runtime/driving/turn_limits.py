@@ -12,8 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from runtime.driving.driver import MappedDriver
 from runtime.driving.performer import Pose
-from runtime.puppet.puppet import Puppet
+from runtime.puppet.puppet import Motion, Puppet
 from solvers.signal.histogram import Counts, count, percentile
 
 Array = NDArray[np.float64]
@@ -30,22 +31,37 @@ _BIN = 0.002  # of stretch: what a percentile is exact to
 _BINS = 2001  # so stretches up to 4 are told apart; all above count as 4
 
 
-def limit_turns(puppet: Puppet, poses: Sequence[Pose]) -> Array:
-    """Go through poses and set the puppet's gains so that its surface can follow them all.
+def limit_turns(puppet: Puppet, driver: MappedDriver, poses: Sequence[Pose]) -> Array:
+    """Try poses, and set the driver's gains so that the surface can follow all of them.
+
+    Args:
+        puppet: what is driven.
+        driver: its driver, prepared.
+        poses: T poses of the performer.
 
     Returns:
-        (2, 3) [m] least and greatest corner of all that it fills meanwhile, on the stage.
+        (2, 3) [m] least and greatest corner of all that the puppet fills meanwhile, on the stage.
     """
-    trial = _Trial(puppet, poses)
+    trial = _Trial(puppet, driver, poses)
     for _ in range(ROUNDS):
         if _tight(trial.all_edges.sum(axis=0), OF_ALL) <= MOST_STRETCH:
             break
-        puppet.gains *= _steps(_tightness(trial))
+        driver.gains *= _steps(_tightness(trial))
         trial.repeat(_tight(trial.all_edges, OF_ALL))
-    for limb in range(len(puppet.gains)):
-        _spare(puppet, trial, limb)
+    for limb in range(len(driver.gains)):
+        _spare(driver, trial, limb)
     puppet.forget()
-    return np.array([trial.boxes[:, 0].min(axis=0), trial.boxes[:, 1].max(axis=0)])
+    return corners_of(trial.boxes)
+
+
+def box_of(motion: Motion) -> Array:
+    """Return the least and greatest corner (2, 3) [m] of a character on the stage."""
+    return np.array([motion.vertices.min(axis=0), motion.vertices.max(axis=0)])
+
+
+def corners_of(boxes: Array) -> Array:
+    """Return the least and greatest corner (2, 3) [m] of boxes (T, 2, 3) [m]."""
+    return np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
 
 
 class _Trial:
@@ -60,10 +76,11 @@ class _Trial:
         all_edges: (T, B) how many of all edges do.
     """
 
-    def __init__(self, puppet: Puppet, poses: Sequence[Pose]) -> None:
+    def __init__(self, puppet: Puppet, driver: MappedDriver, poses: Sequence[Pose]) -> None:
         self._puppet = puppet
+        self._driver = driver
         self._poses = poses
-        self._pulled = [np.flatnonzero(edges) for edges in puppet.pulls().T]
+        self._pulled = [np.flatnonzero(edges) for edges in driver.pulls().T]
         self._gains = np.empty((len(poses), len(self._pulled)))
         self.boxes = np.empty((len(poses), 2, 3))
         self.limb_edges = np.empty((len(poses), len(self._pulled), _BINS), dtype=np.int64)
@@ -84,15 +101,16 @@ class _Trial:
         while True:
             tight = _tight(self.limb_edges[:, limb], OF_LIMB)
             number = int(np.argmax(tight))
-            is_bound = not np.array_equal(self._gains[number], self._puppet.gains)
+            is_bound = not np.array_equal(self._gains[number], self._driver.gains)
             if tight[number] <= MOST_STRETCH or not is_bound:
                 return number, float(tight[number])
             self.attempt(number)
 
     def attempt(self, number: int) -> None:
         """Try one pose."""
-        self._gains[number] = self._puppet.gains
-        self.boxes[number], stretch = self._puppet.attempt(self._poses[number])
+        self._gains[number] = self._driver.gains
+        self.boxes[number] = box_of(self._puppet.attempt(self._poses[number]))
+        stretch = self._puppet.surface.stretch
         self.all_edges[number] = self.limb_edges[number] = 0
         count(stretch, _BIN, self.all_edges[number])
         for limb, edges in enumerate(self._pulled):
@@ -118,7 +136,7 @@ def _steps(tight: Array | float) -> Array:
     return np.where(shares < 1.0, np.minimum(shares, STEPS[1]), 1.0)
 
 
-def _spare(puppet: Puppet, trial: _Trial, limb: int) -> None:
+def _spare(driver: MappedDriver, trial: _Trial, limb: int) -> None:
     """Hold one limb back until its edges are crushed in no pose, or that helps no more.
 
     The worst pose says how far, and whether it helps; others are tried again only where they may
@@ -128,10 +146,10 @@ def _spare(puppet: Puppet, trial: _Trial, limb: int) -> None:
         number, tight = trial.worst(limb)
         if tight <= MOST_STRETCH:
             return
-        gain = puppet.gains[limb]
-        puppet.gains[limb] *= _steps(tight)
+        gain = driver.gains[limb]
+        driver.gains[limb] *= _steps(tight)
         trial.attempt(number)
         if float(_tight(trial.limb_edges[number, limb], OF_LIMB)) > HELPED * tight:
-            puppet.gains[limb] = gain
+            driver.gains[limb] = gain
             trial.attempt(number)
             return

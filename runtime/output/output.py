@@ -8,6 +8,9 @@ from typing import Protocol, Self, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
+from devices.errors import InputError
+from runtime.driving.targets import PosedNodes
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PerformedFrame:
@@ -18,9 +21,8 @@ class PerformedFrame:
         time: the performance's time [s], never falling; only differences count.
         vertices: (N, 3) [m] welded vertices of the character, on the stage; who keeps them copies
             them, since a later frame overwrites them.
-        node_positions: (K, 3) [m] where the nodes of the character's skeleton are, on the stage.
-        node_rotations: (K, 4) unit quaternions (x, y, z, w), world, of each node since its rest
-            pose: all of them (0, 0, 0, 1) at rest.
+        nodes: the K nodes of the character's skeleton, on the stage; None where the driver poses
+            none.
         picture: (H, W, 4) uint8 sRGB with straight alpha, top row first, or None when nobody needs
             one of this frame.
     """
@@ -28,9 +30,24 @@ class PerformedFrame:
     index: int
     time: float
     vertices: NDArray[np.float64]
-    node_positions: NDArray[np.float64]
-    node_rotations: NDArray[np.float64]
+    nodes: PosedNodes | None
     picture: NDArray[np.uint8] | None = None
+
+    def nodes_for(self, what: str) -> PosedNodes:
+        """Return the posed nodes, for an output that cannot do without them.
+
+        Args:
+            what: the output, for the message.
+
+        Raises:
+            InputError: the driver poses no nodes.
+        """
+        if self.nodes is None:
+            raise InputError(
+                f"{what} needs the posed nodes of a skeleton, and this character's driver poses "
+                "none: write its surface with --cache or a .usdc, or choose another driver"
+            )
+        return self.nodes
 
 
 class Output(Protocol):

@@ -187,13 +187,12 @@ class FrameLoop:
         self.frames += 1
 
     def _eased(self, part: int, time: float) -> Pose | None:
-        """What the puppets of a part follow at `time` [s]: its performer's pose, or on its way."""
-        pose, puppets = self._poses[part], self._acts[part].puppets
+        """The pose that the puppets of a part follow at `time` [s]: their performer's, or eased."""
+        pose = self._poses[part]
         if pose is None:
             return None
-        return self._unfreeze_blends[part].follow(
-            pose, time, [puppet.source_rest for puppet in puppets]
-        )
+        rests = self._acts[part].match_session.rests
+        return self._unfreeze_blends[part].follow(pose, time, rests)
 
     def _publish(self, frame: SkeletonFrame) -> None:
         at, step = frame.time, self._picture_step
@@ -214,8 +213,7 @@ class FrameLoop:
                     index=self.frames,
                     time=at,
                     vertices=motion.vertices,
-                    node_positions=motion.node_positions,
-                    node_rotations=motion.node_rotations,
+                    nodes=motion.nodes,
                     picture=picture,
                 )
                 for output in kept:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from devices.skeleton import Skeleton
 from runtime.characters.character import Character
 from runtime.control.ramp import Ramp
-from runtime.driving.mapping import Mapping
+from runtime.driving.driver import Highlight
 from runtime.driving.performer import Pose
 from runtime.puppet.puppet import Motion, Puppet
 from runtime.render.background import Background
@@ -113,12 +113,12 @@ class Scene:
     def draw(self, pose: Pose | None) -> None:
         """Draw what was uploaded, the chains as they are now, and the performer in the mirror."""
         for character, puppet in zip(self._characters, self._puppets, strict=True):
-            chains = puppet.chains if self.highlights else []
-            character.highlight(chains, _colours(len(chains)))
+            lit = puppet.highlights if self.highlights else []
+            character.highlight([each.points for each in lit], _colours(len(lit)))
         if self._inset is not None and pose is not None:
             self._inset.update(
                 pose.seen,
-                colours=_joint_colours(len(pose.seen), self._puppets[0].mapping),
+                colours=_joint_colours(len(pose.seen), self._puppets[0].highlights),
                 dimmed=pose.filled,
             )
         self.stage.brightness = 1.0 - self.blackout.level
@@ -151,9 +151,9 @@ def _colours(count: int) -> NDArray[np.float64]:
     return PAIR_COLOURS[np.arange(count) % len(PAIR_COLOURS)]
 
 
-def _joint_colours(joints: int, mapping: Mapping) -> NDArray[np.float64]:
-    """Linear RGB of each joint (J, 3) by the chain that it drives; NaN where it drives nothing."""
+def _joint_colours(joints: int, highlights: Sequence[Highlight]) -> NDArray[np.float64]:
+    """Linear RGB of each joint (J, 3): the colour of its highlight; NaN where it has none."""
     colours = np.full((joints, 3), np.nan)
-    for drive, colour in zip(mapping.drives, _colours(len(mapping.drives)), strict=True):
-        colours[list(drive.source[1:])] = colour
+    for highlight, colour in zip(highlights, _colours(len(highlights)), strict=True):
+        colours[list(highlight.joints)] = colour
     return colours

@@ -17,8 +17,9 @@ from replay.recorder import Recorder
 from runtime.conditioning.switches import Conditioning
 from runtime.control.actions import ShowControls
 from runtime.driving.mapping import Mapping
-from runtime.driving.match_session import Choices, MatchSession
+from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer
+from runtime.driving.puppet_match import Choices
 from runtime.output.output import PerformedFrame
 from runtime.output.report.report import Report
 from runtime.puppet.deformable_surface import Elasticity
@@ -69,7 +70,6 @@ class Show:
         folder: Path,
     ) -> None:
         puppet.rest()
-        puppet.show(Mapping(()))
         puppet.surface.elasticity = Elasticity()
         puppet.surface.reset()
         self.now = 0.0
@@ -119,4 +119,4 @@ class Show:
         captured = frame(pose(T_POSE), time)
         self.performer.follow(captured)
         self.match_session.direct(captured)
-        return self.puppet.mapping
+        return self.match_session.mappings[0]

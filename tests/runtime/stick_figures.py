@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping as Turns
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,7 +13,10 @@ from devices.builtin.body import builtin_skeleton
 from devices.skeleton import Skeleton, SkeletonFrame
 from replay.recording import Recording
 from runtime.characters.character import Character, Material, Surface
-from runtime.driving.mapping import Drive
+from runtime.driving.mapping import Drive, Mapping
+from runtime.driving.performer import Rest
+from runtime.driving.polyline_driver import PolylineDriver
+from runtime.puppet.puppet import Puppet
 from solvers.retarget.heading import turned
 
 BODY = builtin_skeleton()
@@ -112,6 +116,15 @@ def drive(source: str, target: tuple[str, ...]) -> Drive:
 
 ARMS = (drive("ArmLeft", LEFT_ARM), drive("ArmRight", RIGHT_ARM))
 LEGS = (drive("LegLeft", LEFT_LEG), drive("LegRight", RIGHT_LEG))
+
+
+def driven_by(puppet: Puppet, drives: Sequence[Drive], rest: Rest) -> PolylineDriver:
+    """A new driver of a puppet, which these drives move from this rest state."""
+    driver = PolylineDriver(BODY, puppet.character, puppet.bound_skeleton, puppet.surface)
+    driver.show(Mapping(tuple(drives)), FRONT_VIEW)
+    driver.prepare((), rest)
+    puppet.drive_with(driver)
+    return driver
 
 
 def pose(

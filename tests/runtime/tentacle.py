@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from devices.skeleton import Skeleton
 from runtime.characters.character import Character, Material, Surface
+from runtime.driving.targets import PosedNodes
 from runtime.output.output import PerformedFrame
 
 RINGS, SIDES, NODES = 25, 12, 7
@@ -104,8 +105,7 @@ def _perform(
         index=index,
         time=time,
         vertices=_skin(character, positions, rotations),
-        node_positions=positions,
-        node_rotations=rotations.as_quat(),
+        nodes=PosedNodes(positions, rotations.as_quat()),
         picture=None if size is None else _picture(index, *size),
     )
 

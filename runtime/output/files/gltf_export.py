@@ -106,10 +106,11 @@ class GltfExport:
     def _fitted_skin(self) -> Skin:
         vertices, skeleton = self._character.vertices, self._character.skeleton
         frames = self._samples
+        nodes = [frame.nodes_for("a skinned .glb") for frame in frames]
         samples = PosedSamples(
             np.array([frame.vertices for frame in frames]).reshape(-1, *vertices.shape),
-            np.array([frame.node_positions for frame in frames]),
-            np.array([frame.node_rotations for frame in frames]),
+            np.array([posed.positions for posed in nodes]),
+            np.array([posed.rotations for posed in nodes]),
         )
         if self._character.weights is not None:
             skin = skin_of_weights(self._character.weights)

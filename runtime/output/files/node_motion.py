@@ -62,9 +62,10 @@ class NodeMotionRecorder:
             self._times[-1] - self._times[0]
         ):
             return  # files keep times as float32, which must rise
+        nodes = frame.nodes_for("an exported skeleton")
         self._times.append(frame.time)
-        self._positions.append(frame.node_positions.astype(np.float32))
-        self._rotations.append(frame.node_rotations.astype(np.float32))
+        self._positions.append(nodes.positions.astype(np.float32))
+        self._rotations.append(nodes.rotations.astype(np.float32))
 
     def motion(self) -> NodeMotion:
         """All that was collected."""

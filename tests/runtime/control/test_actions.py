@@ -98,9 +98,9 @@ def test_a_match_is_accepted_and_looked_for_again(show: Show) -> None:
     press(show, "accept")
     assert not show.match_session.matching
     assert light(show, "match-again") == 0.0
-    driven = show.puppet.mapping
+    driven = show.match_session.mappings[0]
     press(show, "accept")
-    assert show.puppet.mapping is driven
+    assert show.match_session.mappings[0] is driven
     press(show, "match-again")
     assert show.match_session.matching
 
@@ -119,7 +119,7 @@ def test_matches_are_stepped_through(show: Show) -> None:
     assert show.strike(0.4).drives == second, "steady for a moment"
     for step in range(10):
         show.strike(0.5 + 0.1 * step)
-    assert show.puppet.mapping.drives == best, "the pose chooses again"
+    assert show.match_session.mappings[0].drives == best, "the pose chooses again"
 
 
 @pytest.mark.parametrize("name", ["rest-pose", "calibrate"])
@@ -229,13 +229,13 @@ def test_frozen_characters_hold_while_frames_and_takes_go_on(show: Show, tmp_pat
 
 def test_a_match_asked_for_while_frozen_is_shown_afterwards(show: Show) -> None:
     show.loop.tick()
-    shown = show.puppet.mapping.drives
+    shown = show.match_session.mappings[0].drives
     press(show, "freeze", "next-match")
     show.loop.tick()
-    assert show.puppet.mapping.drives == shown
+    assert show.match_session.mappings[0].drives == shown
     press(show, "freeze")
     show.loop.tick()
-    assert show.puppet.mapping.drives != shown
+    assert show.match_session.mappings[0].drives != shown
 
 
 def test_a_blackout_fades_pictures_to_black_and_back(show: Show) -> None:

@@ -166,10 +166,10 @@ def test_what_is_asked_for_is_done_in_order(show: Staged) -> None:
 
 
 def test_a_show_is_run_from_a_phone_from_match_to_blackout(show: Staged) -> None:
-    show.until(lambda: len(show.puppet.mapping.drives) > 0)
-    shown = show.puppet.mapping.drives
+    show.until(lambda: len(show.match_session.mappings[0].drives) > 0)
+    shown = show.match_session.mappings[0].drives
     show.client.send_message("/bunraku/next-match", 1)
-    show.until(lambda: show.puppet.mapping.drives not in ((), shown))
+    show.until(lambda: show.match_session.mappings[0].drives not in ((), shown))
     show.client.send_message("/bunraku/accept", 1)
     show.until(lambda: not show.match_session.matching)
     show.client.send_message("/bunraku/freeze", 1)

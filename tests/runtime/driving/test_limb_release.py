@@ -6,11 +6,10 @@ import numpy as np
 import pytest
 
 from runtime.driving.limb_release import FIRMEST, LET_GO, LOOSEST, PATIENCE, TAKE_HOLD, LimbRelease
-from runtime.driving.mapping import Mapping
 from runtime.driving.performer import Performer, rest_state
-from runtime.puppet.puppet import Puppet, RootMotion
+from runtime.puppet.puppet import Puppet
 from solvers.deform.handles import HARD
-from tests.runtime.stick_figures import ARMS, BODY, frame, make_figure, pose, waving
+from tests.runtime.stick_figures import ARMS, BODY, driven_by, frame, make_figure, pose, waving
 
 
 def held(grip: LimbRelease, seen: list[bool], seconds: float, start: float) -> list[np.ndarray]:
@@ -54,7 +53,7 @@ def test_a_limb_that_comes_back_elsewhere_does_not_snap():
     figure = make_figure()
     puppet, performer = Puppet(figure), Performer(BODY)
     start = performer.follow(frame(pose()))
-    puppet.take(Mapping(tuple(ARMS)), rest_state(start), np.eye(3), RootMotion())
+    driven_by(puppet, ARMS, rest_state(start))
     arm = list(ARMS[0].source[1:])
     raised = waving(9)[4]
     steps, before = [], None

@@ -136,13 +136,9 @@ def test_a_source_chooses_its_joints(source: str, there: set[str], missing: set[
             assert above >= 0, "hung on one that is no ancestor"
 
 
-def test_legs_are_known_where_there_are_any() -> None:
-    legs = Performer(BODY, "left-arm").legs
-    assert [BODY.index("KneeLeft") in leg for leg in legs] == [True, False]
-    assert [BODY.index("KneeRight") in leg for leg in legs] == [False, True]
+def test_a_finger_alone_has_no_heading() -> None:
     finger = Skeleton(("a", "b", "c"), np.array([-1, 0, 1]), np.eye(3))
     alone = Performer(finger)
-    assert alone.legs == []
     poses = [np.eye(3), turned(np.eye(3), 1.0, np.zeros(3))]
     for before, after in pairwise(poses):
         assert alone.follow(frame(before)).heading == alone.follow(frame(after, 0.1)).heading == 0.0

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from runtime.driving.mapping import Mapping
-from runtime.driving.match_session import Choices, MatchSession
+from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer
+from runtime.driving.puppet_match import Choices
 from runtime.driving.rehearsal import POSES, rehearse
 from runtime.puppet.puppet import Puppet
 from tests.runtime.stick_figures import (
@@ -32,7 +33,6 @@ def puppet() -> Puppet:
 
 def director_of(puppet: Puppet, source: str = "whole") -> MatchSession:
     puppet.rest()
-    puppet.show(Mapping(()))
     hand = Mapping(ARMS)
     return MatchSession(Performer(BODY, source), [puppet], lambda: FRONT_VIEW, Choices(), [hand])
 
@@ -80,7 +80,7 @@ def test_poses_of_which_too_little_is_seen_are_left_out(puppet: Puppet) -> None:
     match_session = director_of(puppet)
     assert rehearse(record([hidden] * 5), "whole", match_session) is None
     assert match_session.matching, "it matches as it would live"
-    assert puppet.mapping.drives == ()
+    assert match_session.mappings[0].drives == ()
     assert rehearse(record([hidden, hidden, pose(T_POSE)]), "whole", match_session) is not None
     assert not match_session.matching
     assert moves(puppet, pose(T_POSE)) < 1e-9

@@ -7,15 +7,17 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from runtime.driving.mapping import Drive, Mapping
+from runtime.characters.character import Character
+from runtime.driving.mapping import Drive
 from runtime.driving.performer import Performer, Pose, rest_state
+from runtime.driving.polyline_driver import PolylineDriver
 from runtime.driving.turn_limits import MOST_STRETCH, limit_turns
-from runtime.puppet.puppet import Puppet, RootMotion
+from runtime.puppet.puppet import Puppet
 from tests.runtime.stick_figures import (
     ARMS,
     BODY,
-    FRONT_VIEW,
     WEB,
+    driven_by,
     frame,
     make_figure,
     node,
@@ -34,9 +36,14 @@ def seen(positions: np.ndarray) -> Pose:
     return Performer(BODY).follow(frame(positions))
 
 
-def driven(puppet: Puppet, drives: Sequence[Drive]) -> Puppet:
-    puppet.take(Mapping(tuple(drives)), rest_state(seen(pose())), FRONT_VIEW, RootMotion())
-    return puppet
+def driven(character: Character, drives: Sequence[Drive]) -> tuple[Puppet, PolylineDriver]:
+    puppet = Puppet(character)
+    return puppet, driven_by(puppet, drives, rest_state(seen(pose())))
+
+
+def stretch_of(puppet: Puppet, moment: Pose) -> np.ndarray:
+    puppet.attempt(moment)
+    return puppet.surface.stretch
 
 
 def nods(*angles: float) -> list[Pose]:
@@ -48,13 +55,13 @@ def test_only_the_limb_that_cannot_follow_is_held_back() -> None:
         seen(pose({"ShoulderLeft": (0, 0, angle), "ShoulderRight": (0, 0, -angle)}))
         for angle in (0.0, 0.5, 0.9, 1.3)
     ]
-    free = driven(Puppet(FIGURE), ARMS)
-    box = limit_turns(free, swings)
-    np.testing.assert_array_equal(free.gains, [1.0, 1.0])
-    webbed = driven(Puppet(make_figure(WEB)), ARMS)
-    limit_turns(webbed, swings)
-    assert webbed.gains[0] < 0.95
-    assert webbed.gains[1] == 1.0
+    free, driver = driven(FIGURE, ARMS)
+    box = limit_turns(free, driver, swings)
+    np.testing.assert_array_equal(driver.gains, [1.0, 1.0])
+    webbed, held = driven(make_figure(WEB), ARMS)
+    limit_turns(webbed, held, swings)
+    assert held.gains[0] < 0.95
+    assert held.gains[1] == 1.0
 
     assert box.shape == (2, 3)
     for moment in swings:
@@ -70,32 +77,31 @@ def test_only_the_limb_that_cannot_follow_is_held_back() -> None:
 @pytest.mark.parametrize(("deepest", "held"), [(0.5, False), (2.2, True)])
 def test_a_small_limb_that_crushes_itself_is_held_back(deepest: float, held: bool) -> None:
     """In one pose of many, and with so few edges that the whole surface hardly tells."""
-    puppet = driven(Puppet(FIGURE), (HEAD, *ARMS))
-    edges = puppet.pulls()[:, 0]
+    puppet, driver = driven(FIGURE, (HEAD, *ARMS))
+    edges = driver.pulls()[:, 0]
     poses = nods(*[0.0] * 9, deepest)
-    unheld = puppet.attempt(poses[-1])[1]
+    unheld = stretch_of(puppet, poses[-1])
     assert np.percentile(np.append(np.zeros(9 * len(unheld)), unheld), 99.0) < MOST_STRETCH
-    limit_turns(puppet, poses)
-    assert (puppet.gains[0] < 1.0) == held
-    np.testing.assert_array_equal(puppet.gains[1:], 1.0)
-    assert np.percentile(puppet.attempt(poses[-1])[1][edges], 95.0) <= 1.1 * MOST_STRETCH
+    limit_turns(puppet, driver, poses)
+    assert (driver.gains[0] < 1.0) == held
+    np.testing.assert_array_equal(driver.gains[1:], 1.0)
+    assert np.percentile(stretch_of(puppet, poses[-1])[edges], 95.0) <= 1.1 * MOST_STRETCH
 
 
 def test_a_limb_that_another_crushes_is_left_alone() -> None:
-    puppet = driven(Puppet(make_figure(BETWEEN_ARM_AND_HEAD)), (HEAD, *ARMS))
-    limit_turns(
-        puppet, [seen(pose({"ShoulderLeft": (0, 0, angle)})) for angle in [0.0] * 29 + [1.4]]
-    )
-    assert puppet.gains[0] == 1.0
-    assert puppet.gains[1] < 0.95
+    puppet, driver = driven(make_figure(BETWEEN_ARM_AND_HEAD), (HEAD, *ARMS))
+    raised = [seen(pose({"ShoulderLeft": (0, 0, angle)})) for angle in [0.0] * 29 + [1.4]]
+    limit_turns(puppet, driver, raised)
+    assert driver.gains[0] == 1.0
+    assert driver.gains[1] < 0.95
 
 
 def test_a_rehearsal_leaves_no_trace_in_the_show() -> None:
     shown = []
     for rehearsals in (0, 1):
-        puppet, performer = driven(Puppet(FIGURE), ARMS), Performer(BODY)
+        (puppet, driver), performer = driven(FIGURE, ARMS), Performer(BODY)
         for _ in range(rehearsals):
-            limit_turns(puppet, [seen(positions) for positions in waving(4)])
+            limit_turns(puppet, driver, [seen(positions) for positions in waving(4)])
         for number, positions in enumerate(waving(4)):
             puppet.follow(performer.follow(frame(positions, number / 30.0)))
             motion = puppet.deform()

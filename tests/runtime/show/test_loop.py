@@ -18,8 +18,9 @@ from replay.recorded_stream import RecordedStream
 from replay.recording import Recording
 from runtime.conditioning.switches import Conditioning, filled_only, for_live
 from runtime.driving.mapping import Mapping
-from runtime.driving.match_session import Choices, MatchSession
+from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer
+from runtime.driving.puppet_match import Choices
 from runtime.output.output import PerformedFrame
 from runtime.output.report.report import Report
 from runtime.puppet.puppet import Puppet
@@ -242,8 +243,8 @@ def test_a_bystanders_frames_are_counted_and_move_nothing(puppet: Puppet) -> Non
     assert play(loop, player) == len(recording)
     assert [frame.performer for frame in tape.frames] == [4, 9] * 5
     for lead, bystander in zip(kept.frames[::2], kept.frames[1::2], strict=True):
-        np.testing.assert_array_equal(lead.node_positions, bystander.node_positions)
-    assert kept.frames[4].node_positions[:, 1].max() > kept.frames[0].node_positions[:, 1].max()
+        np.testing.assert_array_equal(lead.nodes.positions, bystander.nodes.positions)
+    assert kept.frames[4].nodes.positions[:, 1].max() > kept.frames[0].nodes.positions[:, 1].max()
 
     now = [0.0]
     player = Player(recording, RealTime(clock=lambda: now[0]))
@@ -428,7 +429,7 @@ def test_a_stream_is_put_in_order_and_recorded_as_it_came(puppet: Puppet) -> Non
     steps = np.diff([each.time for each in kept.frames])
     assert (steps > 0.0).all()
     assert steps.max() < 0.11
-    tops = [each.node_positions[:, 1].max() for each in kept.frames]
+    tops = [each.nodes.positions[:, 1].max() for each in kept.frames]
     assert max(tops) > tops[0] + 0.2, "who came back goes on"
 
 
@@ -450,7 +451,7 @@ def test_a_mirror_that_is_switched_turns_the_character_over(puppet: Puppet) -> N
         performer.follow(captured(place, index * 0.1))
         match_session.direct(captured(place, index * 0.1))
         puppet.follow(performer.pose)
-        nodes = puppet.deform().node_positions
+        nodes = puppet.deform().nodes.positions
         tops.append((nodes[left, 1], nodes[right, 1]))
     assert tops[1][0] > tops[0][0] + 0.3
     np.testing.assert_allclose(tops[2], tops[1][::-1], atol=0.03)

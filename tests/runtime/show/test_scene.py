@@ -11,11 +11,20 @@ import pytest
 from devices.skeleton import Skeleton
 from runtime.driving.mapping import Mapping
 from runtime.driving.performer import Performer, Pose, rest_state
-from runtime.puppet.puppet import Motion, Puppet, RootMotion
+from runtime.puppet.puppet import Motion, Puppet
 from runtime.render.background import NOTHING
 from runtime.render.camera import Camera, box_corners
 from runtime.show.scene import BLACKOUT, GAP, Scene
-from tests.runtime.stick_figures import ARMS, BODY, FRONT_VIEW, T_POSE, frame, make_figure, pose
+from tests.runtime.stick_figures import (
+    ARMS,
+    BODY,
+    FRONT_VIEW,
+    T_POSE,
+    driven_by,
+    frame,
+    make_figure,
+    pose,
+)
 
 SIZE = (96, 54)
 WIDE = ((0.24, 0.72, -0.16), (1.6, 0.96, 0.16))
@@ -46,7 +55,7 @@ def rested(puppets: Sequence[Puppet]) -> list[Motion]:
     for puppet in puppets:
         puppet.rest()
         puppet.surface.reset()
-        puppet.take(Mapping(ARMS), rest_state(start), FRONT_VIEW, RootMotion())
+        driven_by(puppet, ARMS, rest_state(start))
     return [puppet.deform() for puppet in puppets]
 
 
@@ -150,8 +159,7 @@ def test_matched_chains_light_up_unless_they_are_hidden(
     assert differ(lit, dark) > 20
     scene.highlights = True
     np.testing.assert_array_equal(picture(scene, one, None), lit)
-    puppet = one[0]
-    puppet.show(Mapping(()))
+    one[0].driver.show(Mapping(()), FRONT_VIEW)
     np.testing.assert_array_equal(picture(scene, one, None), dark)
 
 
@@ -165,8 +173,9 @@ def test_what_is_uploaded_needs_no_chains_and_is_drawn_with_them(
     theatres[0].upload(motions)
     assert len(character.tubes) == 0, "what the vertices do not need is left for the drawing"
     theatres[0].draw(None)
-    rods = sum(len(chain) - 1 for chain in one[0].chains)
-    assert len(character.tubes) == 2 * rods + sum(len(chain) for chain in one[0].chains)
+    lit = [each.points for each in one[0].highlights]
+    assert len(lit) == len(ARMS)
+    assert len(character.tubes) == 2 * sum(len(chain) - 1 for chain in lit) + sum(map(len, lit))
 
 
 def test_the_mirror_shows_the_performer(
@@ -251,7 +260,7 @@ def test_any_performer_fits_into_the_mirror(
 ) -> None:
     one = puppets[:1]
     rested(one)
-    one[0].show(Mapping(()))
+    one[0].driver.show(Mapping(()), FRONT_VIEW)
     lone = Skeleton(("only",), np.array([-1]), np.zeros((1, 3)))
     theatres.append(Scene(context, SIZE, one, lone))
     moment = Performer(lone).follow(frame(np.array([[0.0, 1.0, 0.0]])))

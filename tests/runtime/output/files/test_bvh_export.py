@@ -14,6 +14,7 @@ from replay.bvh.motion import forward_kinematics
 from replay.bvh.reader import read_bvh
 from replay.bvh.text import read_bvh_text
 from runtime.characters.character import Character
+from runtime.driving.targets import PosedNodes
 from runtime.output.files.bvh_export import BvhExport
 from runtime.output.output import PerformedFrame
 from tests.runtime.tentacle import NODES, make_show, make_tentacle
@@ -41,21 +42,24 @@ def test_a_rigid_chain_comes_back_exactly(tmp_path: Path) -> None:
     names, positions, rotations, step = read(tmp_path / "a.bvh")
     assert names == [f"node_{k}" for k in range(NODES)]
     assert step == pytest.approx(1 / 30, abs=1e-8)
-    expected = np.stack([frame.node_positions for frame in show])
+    expected = np.stack([frame.nodes.positions for frame in show])
     np.testing.assert_allclose(positions, expected, atol=1e-6)
-    turns = Rotation.from_quat(np.stack([frame.node_rotations for frame in show]))
+    turns = Rotation.from_quat(np.stack([frame.nodes.rotations for frame in show]))
     assert (turns.inv() * Rotation.from_quat(rotations)).magnitude().max() < 1e-5
 
 
 def test_bones_point_where_the_nodes_are_whatever_the_nodes_rotations_say(tmp_path: Path) -> None:
     character = make_tentacle()
     show = [
-        replace(frame, node_rotations=np.roll(frame.node_rotations, 1, axis=0))
+        replace(
+            frame,
+            nodes=replace(frame.nodes, rotations=np.roll(frame.nodes.rotations, 1, axis=0)),
+        )
         for frame in make_show(character)
     ]
     export(tmp_path / "a.bvh", character, show)
     positions = read(tmp_path / "a.bvh")[1]
-    expected = np.stack([frame.node_positions for frame in show])
+    expected = np.stack([frame.nodes.positions for frame in show])
     np.testing.assert_allclose(positions, expected, atol=1e-5)
 
 
@@ -73,12 +77,12 @@ def test_a_branching_skeleton_comes_back_with_its_limbs(tmp_path: Path) -> None:
             if parents[node] >= 0:
                 bone = turns[int(parents[node])].apply(rest[node] - rest[parents[node]])
                 positions[node] = positions[parents[node]] + bone
-        show.append(replace(frame, node_positions=positions, node_rotations=turns.as_quat()))
+        show.append(replace(frame, nodes=PosedNodes(positions, turns.as_quat())))
     export(tmp_path / "a.bvh", character, show)
     names, positions, _, _ = read(tmp_path / "a.bvh")
     assert names == ["b", "a", "f", "c", "d", "e"]
     order = [skeleton.index(name) for name in names]
-    expected = np.stack([frame.node_positions[order] for frame in show])
+    expected = np.stack([frame.nodes.positions[order] for frame in show])
     np.testing.assert_allclose(positions, expected, atol=1e-5)
 
 
@@ -93,7 +97,7 @@ def test_jitter_and_gaps_keep_their_timing(tmp_path: Path) -> None:
     assert step == pytest.approx(1 / 30, rel=0.05)
     late = show[30]
     shown = positions[round((late.time - show[0].time) / step)]
-    np.testing.assert_allclose(shown, late.node_positions, atol=0.02)
+    np.testing.assert_allclose(shown, late.nodes.positions, atol=0.02)
 
 
 def test_angles_do_not_jump(tmp_path: Path) -> None:
@@ -102,8 +106,10 @@ def test_angles_do_not_jump(tmp_path: Path) -> None:
     show = [
         replace(
             frame,
-            node_positions=spin.apply(np.array(character.skeleton.rest_positions)),
-            node_rotations=np.tile(spin.as_quat(), (NODES, 1)),
+            nodes=PosedNodes(
+                spin.apply(np.array(character.skeleton.rest_positions)),
+                np.tile(spin.as_quat(), (NODES, 1)),
+            ),
         )
         for frame, spin in zip(make_show(character, frames=len(spins)), spins, strict=True)
     ]

@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from devices.errors import InputError
 from runtime.characters.character import Character
+from runtime.driving.targets import PosedNodes
 from runtime.output.files.gltf_export import GltfExport
 from runtime.output.output import PerformedFrame
 from tests.runtime.tentacle import HEIGHT, NODES, make_show, make_tentacle
@@ -109,8 +110,10 @@ def test_the_nodes_are_exactly_where_they_were(tmp_path: Path) -> None:
     show = [  # nodes that move and turn freely, beyond what rigid bones could do
         replace(
             frame,
-            node_positions=frame.node_positions + random.normal(0, 0.05, (NODES, 3)),
-            node_rotations=Rotation.random(NODES, rng=random).as_quat(),
+            nodes=PosedNodes(
+                frame.nodes.positions + random.normal(0, 0.05, (NODES, 3)),
+                Rotation.random(NODES, rng=random).as_quat(),
+            ),
         )
         for frame in make_show(character, frames=6)
     ]
@@ -118,8 +121,8 @@ def test_the_nodes_are_exactly_where_they_were(tmp_path: Path) -> None:
     player = Player(tmp_path / "a.glb")
     for frame in show:
         matrices = player.node_matrices(frame.time)[:NODES]
-        np.testing.assert_allclose(matrices[:, :3, 3], frame.node_positions, atol=1e-5)
-        turns = Rotation.from_quat(frame.node_rotations).as_matrix()
+        np.testing.assert_allclose(matrices[:, :3, 3], frame.nodes.positions, atol=1e-5)
+        turns = Rotation.from_quat(frame.nodes.rotations).as_matrix()
         np.testing.assert_allclose(matrices[:, :3, :3], turns, atol=1e-5)
 
 
@@ -182,7 +185,10 @@ def test_rotations_do_not_take_the_long_way(tmp_path: Path) -> None:
     character = make_tentacle()
     random = np.random.default_rng(0)
     show = [
-        replace(frame, node_rotations=frame.node_rotations * signs[:, None])
+        replace(
+            frame,
+            nodes=replace(frame.nodes, rotations=frame.nodes.rotations * signs[:, None]),
+        )
         for frame, signs in zip(
             make_show(character), random.choice([-1, 1], (40, NODES)), strict=True
         )

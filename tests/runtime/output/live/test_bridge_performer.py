@@ -16,8 +16,9 @@ from devices.skeleton import SkeletonFrame
 from devices.stream import SkeletonStream
 from runtime.conditioning.switches import Conditioning, for_live
 from runtime.driving.mapping import Mapping
-from runtime.driving.match_session import Choices, MatchSession
+from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer, Pose
+from runtime.driving.puppet_match import Choices
 from runtime.output.live.bridge_performer import GUESSED, BridgePerformer
 from runtime.output.live.bridge_publisher import BridgePublisher, binding
 from runtime.output.output import Output, PerformedFrame
@@ -41,7 +42,7 @@ def publisher() -> Iterator[BridgePublisher]:
 
 def performed(at: float) -> PerformedFrame:
     none = np.zeros((0, 3))
-    return PerformedFrame(0, at, none, none, np.zeros((0, 4)))
+    return PerformedFrame(0, at, none, None)
 
 
 def heard(stream: BridgeStream, count: int) -> list[SkeletonFrame]:
@@ -143,6 +144,6 @@ def test_a_second_stage_has_both_performers_as_the_first_has_them(
         assert pose_here is not None
         assert pose_there.performer == number
         np.testing.assert_allclose(pose_there.seen, pose_here.seen, atol=0.01)
-    turns = [np.array([one.node_positions for one in output.frames]) for (output,) in kept]
+    turns = [np.array([one.nodes.positions for one in output.frames]) for (output,) in kept]
     assert all(np.ptp(one, axis=0).max() > 0.2 for one in turns), "both characters wave"
     assert np.abs(turns[0] - turns[1]).max() > 0.2, "each by itself, a second apart"

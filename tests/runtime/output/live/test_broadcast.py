@@ -36,7 +36,7 @@ def picture(size: tuple[int, int] = (6, 4)) -> np.ndarray:
 
 def performed(index: int, shown: np.ndarray | None) -> PerformedFrame:
     empty = np.zeros((0, 3))
-    return PerformedFrame(index, index / 30.0, empty, empty, np.zeros((0, 4)), shown)
+    return PerformedFrame(index, index / 30.0, empty, None, shown)
 
 
 class Wire:

@@ -42,7 +42,7 @@ def marionette() -> Iterator[socket.socket]:
 
 def performed(index: int) -> PerformedFrame:
     none = np.zeros((0, 3))
-    return PerformedFrame(index, 70.0 + index / 60, none, none, np.zeros((0, 4)))
+    return PerformedFrame(index, 70.0 + index / 60, none, None)
 
 
 def seen(positions: np.ndarray, index: int) -> SkeletonFrame:

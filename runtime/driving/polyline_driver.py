@@ -1,0 +1,199 @@
+"""The driver that carries motion from chains of the performer over to chains of the character.
+
+AniMesh (Jin et al. 2015), section 5: each chain turns from the rest pose of the character as the
+performer's chain turns from the performer's rest state.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from devices.errors import InputError
+from devices.skeleton import Skeleton
+from runtime.characters.character import Character
+from runtime.driving.driven_chains import DrivenChains
+from runtime.driving.driver import Highlight, MappedDriver, Needs
+from runtime.driving.exaggeration import Exaggeration, Strain
+from runtime.driving.limb_release import LimbRelease
+from runtime.driving.mapping import Mapping
+from runtime.driving.performer import Pose, Rest
+from runtime.driving.root_motion import RootMotion, chain_length, legs_of, root_motion
+from runtime.driving.targets import HandleTargets, PosedNodes, Targets
+from runtime.puppet.bound_skeleton import BoundSkeleton
+from runtime.puppet.deformable_surface import DeformableSurface
+from solvers.retarget.chain_retargets import ChainRetargets
+from solvers.retarget.polyline_motion import map_chain
+
+Array = NDArray[np.float64]
+
+STRAIGHT_ON = np.eye(3)  # the view of a capture device
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Link:
+    """A mapping from one rest state on, and what its parts remember between frames.
+
+    Attributes:
+        rest: the performer's rest state.
+        chains: the driven chains of the character.
+        source_tips: (D,) last joint of each of the performer's chains.
+        root_motion: how far the whole character goes along.
+        retargets, exaggeration, limb_release: these remember the frames before.
+    """
+
+    rest: Rest
+    chains: DrivenChains
+    source_tips: NDArray[np.int64]
+    root_motion: RootMotion
+    retargets: ChainRetargets
+    exaggeration: Exaggeration
+    limb_release: LimbRelease
+
+
+class PolylineDriver(MappedDriver):
+    """Moves chains of a character relative to a rest state, as chains of the performer move.
+
+    Args:
+        performer: the performer's whole skeleton.
+        character: what is moved.
+        skeleton: the character's bound skeleton.
+        surface: the character's surface, for its elasticity and its edges.
+
+    Attributes:
+        mapping: the mapping that drives, or that is shown.
+        gains: (D,) for each drive the share of the performer's turns that is carried over, in
+            (0, 1].
+    """
+
+    needs = Needs()
+
+    def __init__(
+        self,
+        performer: Skeleton,
+        character: Character,
+        skeleton: BoundSkeleton,
+        surface: DeformableSurface,
+    ) -> None:
+        self.mapping = Mapping(())
+        self.gains = np.ones(0)
+        self._view = STRAIGHT_ON
+        self._legs = legs_of(performer)
+        self._character = character
+        self._skeleton = skeleton
+        self._surface = surface
+        self._link: _Link | None = None
+        self._positions = skeleton.tree.positions
+
+    def show(self, mapping: Mapping, view: Array) -> None:
+        """Show a mapping without being driven by it: see `MappedDriver.show`."""
+        self.mapping, self._view = mapping, view
+
+    def prepare(self, clip: Sequence[Pose], rest: Rest | None) -> None:
+        """Start to drive by the mapping shown, from this rest state: see `Driver.prepare`.
+
+        Raises:
+            InputError: chains that share a bone, or lead towards one another.
+        """
+        if rest is None:
+            self._link = None
+            self._positions = self._skeleton.tree.positions
+            return
+        drives, nodes = self.mapping.drives, self._skeleton.tree.positions
+        chains = self._driven_chains()
+        maps = [
+            map_chain(
+                rest.positions[list(drive.source)],
+                nodes[list(drive.target)],
+                STRAIGHT_ON,
+                self._view,
+                drive.flip,
+            )
+            for drive in drives
+        ]
+        lengths = np.array([chain_length(nodes, drive.target) for drive in drives])
+        height = float(np.ptp(self._character.vertices[:, 1]))
+        self._link = _Link(
+            rest=rest,
+            chains=chains,
+            source_tips=np.array([drive.source[-1] for drive in drives], dtype=np.int64),
+            root_motion=root_motion(self.mapping, self._legs, rest.positions, nodes),
+            retargets=ChainRetargets(maps, [drive.source for drive in drives]),
+            exaggeration=Exaggeration(lengths, height),
+            limb_release=LimbRelease(len(drives)),
+        )
+        self.gains = np.ones(len(drives))
+        self._weights = chains.weights(self._link.limb_release.weights)
+
+    def _driven_chains(self) -> DrivenChains:
+        """The chains of the mapping, around a root that all of them lead away from."""
+        skeleton = self._skeleton
+        chains = tuple(drive.target for drive in self.mapping.drives)
+        # Where any node will do, the nearest start of a chain does too, and moves it alike: no
+        # driven bone lies between them.
+        for root in dict.fromkeys((skeleton.root, *(chain[0] for chain in chains))):
+            try:
+                return DrivenChains(skeleton, root, chains)
+            except ValueError as error:
+                refusal = error
+        raise InputError(
+            f"{self._character.name} cannot be driven so: {refusal}; let all polylines lead "
+            f"away from one node, as from {skeleton.root}, and none share a bone"
+        ) from refusal
+
+    def targets(self, pose: Pose) -> Targets:
+        """Return the targets for a pose; those of the rest pose while nothing drives."""
+        link = self._link
+        if link is None:
+            return self._skeleton.at_rest
+        chains = link.chains
+        placed = chains.place(link.retargets.rotations(pose.facing(link.rest.heading), self.gains))
+        placement = link.root_motion.placement(pose, link.rest)
+        if link.limb_release.follow(pose.time, ~pose.filled[link.source_tips]):
+            self._weights = chains.weights(link.limb_release.weights)
+        elasticity, posed = self._surface.elasticity, placed.positions
+        tips = posed[chains.tips] - posed[chains.starts]
+        strain = link.exaggeration.strain(pose.time, tips, placement.lift, elasticity.cartoon)
+        whole = _whole(strain, elasticity.volume_gain)
+        if not strain.is_none:
+            posed = chains.stretched(posed, strain.of_limbs(chains.limb_of_node)) @ whole.T
+        self._positions = posed
+        anchors = chains.anchors(placed, posed, strain.of_limbs(chains.limb_of_bone), whole)
+        positions = self._skeleton.handle_positions(anchors, 0.5 * elasticity.volume_gain)
+        return Targets(
+            HandleTargets(self._skeleton.handles, positions, self._weights),
+            placement,
+            PosedNodes(posed, placed.rotations),
+        )
+
+    def reset(self) -> None:
+        """Forget the poses before: see `Driver.reset`."""
+        link = self._link
+        if link is not None:
+            link.retargets.reset()
+            link.exaggeration.reset()
+            link.limb_release.reset()
+            self._weights = link.chains.weights(link.limb_release.weights)
+
+    def pulls(self) -> NDArray[np.bool_]:
+        """Return which of D drives pull at each edge (E, D): see `MappedDriver.pulls`."""
+        if self._link is None:
+            return np.zeros((len(self._surface.edges.ends), 0), dtype=np.bool_)
+        return self._link.chains.pulls(self._surface.edges.ends)
+
+    @property
+    def highlights(self) -> list[Highlight]:
+        """The driven chains; each lights up with the joints that drive it."""
+        return [
+            Highlight(self._positions[list(drive.target)], drive.source[1:])
+            for drive in self.mapping.drives
+        ]
+
+
+def _whole(strain: Strain, volume_gain: float) -> Array:
+    """The linear map (3, 3) of a character that is stretched or squashed as a whole."""
+    thin = strain.body ** (-0.5 * volume_gain)
+    return np.diag([thin, strain.body, thin])

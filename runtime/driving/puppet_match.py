@@ -1,0 +1,253 @@
+"""One puppet of a match session: the choice of its mapping and rest state, and its driver."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from devices.errors import InputError
+from runtime.driving.driver import Driver, MappedDriver
+from runtime.driving.drivers import DriverFactory
+from runtime.driving.mapping import Drive, Mapping
+from runtime.driving.performer import Performer, Pose, Rest
+from runtime.driving.polyline_driver import STRAIGHT_ON
+from runtime.driving.turn_limits import box_of, corners_of, limit_turns
+from runtime.puppet.puppet import Puppet
+from solvers.matching import SIZE_PREFERENCE, Match, TargetHierarchy
+from solvers.retarget.abstraction import SimplifiedSource
+from solvers.retarget.match_hysteresis import MatchHysteresis
+from solvers.retarget.posture import likeness
+
+CANDIDATES = 20  # matches that can be cycled through
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Choices:
+    """The settings of the matching that a puppeteer can choose.
+
+    Attributes:
+        rank: which match is shown first, 1 the best.
+        extend: drive a chain on to its longest leaf, or stop at the sub-tree's root (figure 5).
+        flip: turn the targets' y-axes round (section 5.2).
+        patience: seconds that a match must be shown before it performs by itself; 0 at once,
+            infinite only when accepted.
+    """
+
+    rank: int = 1
+    extend: bool = True
+    flip: bool = False
+    patience: float = 0.0
+
+
+class PuppetMatch:
+    """Matches one puppet to a performer, and prepares the puppet's driver.
+
+    Args:
+        performer: the performer whose poses are matched.
+        source: the performer's chosen joints at rest, simplified.
+        puppet: what is driven.
+        choices: the settings of the matching.
+        by_hand: the mapping to use instead of a match, or None.
+        make_driver: makes the puppet's driver.
+
+    Attributes:
+        puppet: see above.
+        rest: the performer's rest state; None while the puppet is not driven.
+    """
+
+    def __init__(
+        self,
+        performer: Performer,
+        source: SimplifiedSource,
+        puppet: Puppet,
+        *,
+        choices: Choices,
+        by_hand: Mapping | None,
+        make_driver: DriverFactory,
+    ) -> None:
+        self.puppet = puppet
+        self.rest: Rest | None = None
+        self._performer, self._source = performer, source
+        self._choices, self._by_hand = choices, by_hand
+        self._clip: Sequence[Pose] = ()
+        self._hierarchy = TargetHierarchy(puppet.bound_skeleton.tree, puppet.bound_skeleton.root)
+        self._hierarchy.rank(source, STRAIGHT_ON, limit=1)  # so that no frame waits for a compiler
+        self._hysteresis = MatchHysteresis(choices.rank - 1)
+        self._driver = self._make(make_driver)
+        puppet.drive_with(self._driver)
+
+    @property
+    def mapping(self) -> Mapping:
+        """The mapping that drives the puppet or is shown; one without drives if there is none."""
+        return self._driver.mapping if isinstance(self._driver, MappedDriver) else Mapping(())
+
+    @property
+    def needs_clip(self) -> bool:
+        """Whether the driver needs the whole clip before the first frame."""
+        return self._driver.needs.clip
+
+    @property
+    def can_perform(self) -> bool:
+        """Whether the driver has what it needs to start."""
+        return not isinstance(self._driver, MappedDriver) or bool(self._driver.mapping.drives)
+
+    def match(self, positions: Array, time: float, view: Array) -> bool:
+        """Show the mapping for a pose; return whether another one was shown before.
+
+        Args:
+            positions: (J, 3) [m] the performer's joints.
+            time: [s].
+            view: (3, 3) rotation from the stage to the camera.
+
+        Raises:
+            InputError: there is no match of the rank that was chosen.
+        """
+        if not isinstance(self._driver, MappedDriver):
+            return False
+        before = self._driver.mapping.drives
+        mapping = self._choose(self._hysteresis, positions, time, view)
+        self._driver.show(mapping, view)
+        return mapping.drives != before
+
+    def perform(self, rest: Rest, view: Array) -> None:
+        """Let the mapping shown drive the puppet, from this rest state on.
+
+        Raises:
+            InputError: the mapping cannot drive this character.
+        """
+        if isinstance(self._driver, MappedDriver):
+            self._driver.show(self._driver.mapping, view)
+        self._driver.prepare(self._clip, rest)
+        self.rest = rest
+
+    def restate(self, rest: Rest, view: Array) -> None:
+        """Go on from another rest state for the same mapping, with the same turn limits."""
+        gains = self._driver.gains if isinstance(self._driver, MappedDriver) else None
+        self.perform(rest, view)
+        if isinstance(self._driver, MappedDriver) and gains is not None:
+            self._driver.gains = gains
+
+    def rehearse(self, clip: Sequence[Pose], states: Sequence[Rest], view: Array) -> None:
+        """Let the puppet perform from that one of these rest states which is most like it.
+
+        A driver without a mapping performs from the first.
+
+        Args:
+            clip: poses of the recording that will be played: see `Driver.prepare`.
+            states: at least one.
+            view: (3, 3) rotation from the stage to the camera.
+        """
+        self._clip, rest = clip, states[0]
+        if isinstance(self._driver, MappedDriver):
+            choices = []
+            for state in states:  # each by itself: no state waits for the one before
+                hysteresis = MatchHysteresis(self._choices.rank - 1)
+                mapping = self._choose(hysteresis, state.positions, 0.0, view)
+                choices.append((mapping, state, hysteresis))
+            worths = [self._worth(mapping, state, view) for mapping, state, _ in choices]
+            mapping, rest, self._hysteresis = choices[int(np.argmax(worths))]
+            self._driver.show(mapping, view)
+        self.perform(rest, view)
+
+    def try_out(self, poses: Sequence[Pose]) -> Array:
+        """Limit the turns to what the surface can follow in these poses, if a mapping drives.
+
+        Returns:
+            (2, 3) [m] least and greatest corner of all that the puppet fills in them, on the stage.
+        """
+        if isinstance(self._driver, MappedDriver):
+            return limit_turns(self.puppet, self._driver, poses)
+        boxes = np.array([box_of(self.puppet.attempt(pose)) for pose in poses])
+        self.puppet.forget()
+        return corners_of(boxes)
+
+    def stop(self) -> None:
+        """Stop driving the puppet, which goes back to its rest pose; the mapping stays shown."""
+        self._driver.prepare((), None)
+        self.puppet.rest()
+        self.rest = None
+
+    def step(self, ranks: int) -> None:
+        """Show the match so many ranks after the one shown, and stay there."""
+        self._hysteresis.cycle(ranks)
+
+    def release(self) -> None:
+        """Let the pose alone choose the match again."""
+        self._hysteresis.release()
+
+    def switch(self, make_driver: DriverFactory, view: Array) -> None:
+        """Let another driver move the puppet from the next pose on, from the same rest state.
+
+        A driver that takes a mapping gets the same mapping and the same turn limits; where there
+        is no mapping yet, the best match for the rest state.
+
+        Raises:
+            InputError: the new driver cannot drive this puppet; the old one goes on.
+        """
+        before, driver = self._driver, self._make(make_driver)
+        if isinstance(driver, MappedDriver):
+            mapping = self.mapping
+            if self.rest is not None and not mapping.drives:
+                mapping = self._choose(self._hysteresis, self.rest.positions, 0.0, view)
+            driver.show(mapping, view)
+        driver.prepare(self._clip, self.rest)
+        if isinstance(driver, MappedDriver) and isinstance(before, MappedDriver):
+            driver.gains = before.gains
+        self._driver = driver
+        self.puppet.drive_with(driver)
+
+    def _make(self, make_driver: DriverFactory) -> Driver:
+        puppet = self.puppet
+        skeleton = self._performer.skeleton
+        return make_driver(skeleton, puppet.character, puppet.bound_skeleton, puppet.surface)
+
+    def _choose(
+        self, hysteresis: MatchHysteresis, positions: Array, time: float, view: Array
+    ) -> Mapping:
+        """The mapping for a pose (J, 3) [m]: by hand, or by the match that the hysteresis shows."""
+        if self._by_hand is not None:
+            return self._by_hand
+        ranked = self._hierarchy.rank(
+            self._source,
+            view,
+            positions[self._performer.joints],
+            limit=CANDIDATES + self._choices.rank,
+            size_preference=SIZE_PREFERENCE,
+        )
+        match = hysteresis.update(ranked, time)
+        if len(ranked) < self._choices.rank or match is None:
+            raise InputError(
+                f"{self.puppet.character.name} has {len(ranked)} matches with this part "
+                f"of the performer, so there is no --match {self._choices.rank}"
+            )
+        return self._mapping_of(match)
+
+    def _mapping_of(self, match: Match) -> Mapping:
+        """The mapping of a match: its chains without the parts inside the trunk."""
+        chosen = match if self._choices.extend else match.stopped()
+        joints, skeleton = self._performer.joints, self.puppet.bound_skeleton
+        drives = []
+        for pair, (nodes, matched) in enumerate(chosen.pairs):
+            source = tuple(joints[node] for node in nodes)
+            target = skeleton.limb(matched) if pair < match.limbs else matched
+            if len(target) < len(matched):
+                source = self._performer.limb(source)
+            if len(source) > 1 and len(target) > 1:
+                drives.append(Drive(source, target, self._choices.flip))
+        return Mapping(tuple(drives), match.score)
+
+    def _worth(self, mapping: Mapping, rest: Rest, view: Array) -> float:
+        """How well a rest state suits: the match's score plus the likeness of the limbs' shapes."""
+        nodes = self.puppet.bound_skeleton.tree.positions
+        shapes = sum(
+            likeness(
+                rest.positions[list(drive.source)], nodes[list(drive.target)], STRAIGHT_ON, view
+            )
+            for drive in mapping.drives
+        )
+        return shapes + (mapping.score if np.isfinite(mapping.score) else 0.0)

@@ -1,0 +1,84 @@
+"""The output of a driver for one frame: a placement and targets for the surface of a character."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
+
+
+@dataclass(frozen=True, slots=True)
+class Placement:
+    """Where the whole character is, relative to its rest pose.
+
+    Attributes:
+        turn: [rad] about the vertical through the root node.
+        travel: [m] along x and z, after the turn.
+        lift: [m] along y. Contact with the floor may lift the character further.
+    """
+
+    turn: float = 0.0
+    travel: tuple[float, float] = (0.0, 0.0)
+    lift: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HandleGroups:
+    """H handles of a deformable surface of C vertices; each group moves rigidly.
+
+    Attributes:
+        vertices: (H,) vertex of the deformed surface (`DeformableSurface.rest`), each once.
+        group_of: (H,) group of each handle, 0 to G - 1.
+    """
+
+    vertices: Indices
+    group_of: Indices
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class HandleTargets:
+    """Targets of handles; the solver deforms the surface to meet them.
+
+    Attributes:
+        handles: the handles. The surface holds them anew when this is another object than in the
+            frame before.
+        positions: (H, 3) [m] target of each handle.
+        weights: (G,) how firmly each group is held: see `ArapSolver.hold`.
+    """
+
+    handles: HandleGroups
+    positions: Array
+    weights: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PosedNodes:
+    """The K nodes of a character's skeleton at one moment.
+
+    Attributes:
+        positions: (K, 3) [m].
+        rotations: (K, 4) quaternions (x, y, z, w), world, from rest.
+    """
+
+    positions: Array
+    rotations: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Targets:
+    """What a driver asks of a character for one frame. Nobody writes to its arrays.
+
+    Attributes:
+        shape: targets of handles, or the finished surface: (N, 3) [m] all vertices of the
+            character, which the solver then leaves as they are. Before the placement.
+        placement: where the whole character is.
+        nodes: the posed nodes, before the placement; None if the driver poses none.
+    """
+
+    shape: HandleTargets | Array
+    placement: Placement = field(default_factory=Placement)
+    nodes: PosedNodes | None = None
