@@ -1,1 +1,1 @@
-"""A performer on another machine: the receiving end of `bunraku bridge`."""
+"""Subscriber side of `bunraku bridge`: performers that another machine publishes."""

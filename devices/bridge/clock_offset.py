@@ -1,7 +1,7 @@
-"""How far the clock of another machine is from ours, from questions and answers.
+"""Estimate the offset between the publisher's clock and ours from request-reply exchanges.
 
-Each exchange bounds the difference: the other clock was read somewhere between our asking and our
-hearing, so the midpoint is wrong by at most half the round trip, however unequal the two ways are.
+Each exchange bounds the offset: the other clock was read between our request and our receipt, so
+the midpoint is wrong by at most half the round trip, however unequal the two directions are.
 Source: F. Cristian, "Probabilistic clock synchronization", Distributed Computing 3, 1989; RFC 5905
 (NTP 4), section 8 for the four times and section 10 for the filter, in which a sample's bound grows
 with its age and the sample with the smallest bound counts.
@@ -13,8 +13,8 @@ from collections import deque
 from dataclasses import dataclass
 
 SAMPLES = 64
-ROUNDING = 1e-6  # [s] what the differences of large numbers of seconds may lose
-DRIFT = 100e-6  # [s/s] two quartz clocks of 50 parts in a million each, in opposite directions
+ROUNDING = 1e-6  # [s] rounding error of differences of large times
+DRIFT = 100e-6  # [s/s] two quartz clocks of 50 parts per million each, in opposite directions
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class _Sample:
 
 
 class ClockOffset:
-    """The other clock minus ours, kept from the last `SAMPLES` exchanges."""
+    """The other clock minus ours, estimated from the last `SAMPLES` exchanges."""
 
     def __init__(self) -> None:
         self._samples: deque[_Sample] = deque(maxlen=SAMPLES)
@@ -37,7 +37,7 @@ class ClockOffset:
 
     @property
     def known(self) -> bool:
-        """Whether there was an exchange yet."""
+        """Whether an exchange has taken place."""
         return self._offset is not None
 
     @property
@@ -45,7 +45,7 @@ class ClockOffset:
         """The other clock minus ours [s].
 
         Raises:
-            ValueError: there was no exchange yet.
+            ValueError: no exchange has taken place.
         """
         if self._offset is None:
             raise ValueError("Expected an exchange before `seconds`, got none")
@@ -53,25 +53,25 @@ class ClockOffset:
 
     @property
     def bound(self) -> float:
-        """How wrong `seconds` may have been [s] at the last exchange; infinite before any."""
+        """Largest possible error of `seconds` [s] at the last exchange; infinite before any."""
         return self._bound
 
     def add(self, asked: float, heard: float, answered: float, back: float) -> bool:
-        """Take in one exchange.
+        """Add one exchange.
 
         Args:
-            asked, back: our clock [s] when the question went out and when the answer came in.
-            heard, answered: the other clock [s] in between.
+            asked, back: our clock [s] when the request was sent and when the reply came in.
+            heard, answered: the other clock [s] at receipt and at reply.
 
         Returns:
-            Whether the four times make sense; what does not is left out.
+            Whether the four times are consistent; other exchanges are ignored.
         """
         round_trip = (back - asked) - (answered - heard)
         if not (back >= asked and answered >= heard and round_trip >= -ROUNDING):
             return False
         round_trip = max(round_trip, ROUNDING)
         newest = _Sample(back, ((heard - asked) + (answered - back)) / 2.0, round_trip / 2.0)
-        # A clock was set, or its machine slept: what cannot be reconciled with the newest is past.
+        # After a clock change or a sleeping machine, samples that contradict the newest are stale.
         agreeing = [
             one
             for one in self._samples
@@ -80,7 +80,7 @@ class ClockOffset:
         self._samples = deque([*agreeing, newest], maxlen=SAMPLES)
         best = min(self._samples, key=lambda one: one.bound_at(back))
         bound = best.bound_at(back)
-        # Inside the bounds nothing is known to be better, and times that move jitter.
+        # Within the bounds no offset is known to be better; keeping it avoids jitter of the times.
         used = self._offset if agreeing and self._offset is not None else best.offset
         self._offset = min(max(used, best.offset - bound), best.offset + bound)
         self._bound = bound + abs(self._offset - best.offset)

@@ -1,4 +1,4 @@
-"""What waits on the stage until the loop asks: the newest frame of each performer, or all."""
+"""Received frames that wait for the frame loop: the newest of each performer, or all frames."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ PERFORMERS = 256
 
 
 class FrameQueue(Protocol):
-    """One thread puts, another takes."""
+    """A queue of frames: one thread puts, another takes."""
 
     @property
     def dropped(self) -> int:
-        """Frames that nobody took in time."""
+        """Frames that were discarded before they were taken."""
         ...
 
     def put(self, frames: Iterable[SkeletonFrame]) -> None:
@@ -25,21 +25,21 @@ class FrameQueue(Protocol):
         ...
 
     def take(self) -> list[SkeletonFrame]:
-        """Every frame that waits, oldest first."""
+        """Return every waiting frame, oldest first."""
         ...
 
     def wait(self, seconds: float) -> bool:
-        """Sleep until a frame is there, at most so long; whether one is."""
+        """Wait at most `seconds` for a frame; return whether there is one."""
         ...
 
     @property
     def waiting(self) -> int:
-        """Frames that the bridge must wait for to be taken."""
+        """Frames in the queue that reduce the credit given to the publisher."""
         ...
 
 
 class LatestFrames:
-    """The newest frame of each performer; a newer one takes its place, and the old is dropped."""
+    """The newest frame of each performer; a newer frame replaces it, and the old one is dropped."""
 
     waiting = 0
 
@@ -62,11 +62,11 @@ class LatestFrames:
                 self._filled.ring()
 
     def wait(self, seconds: float) -> bool:
-        """Sleep until a frame is there, at most so long; whether one is."""
+        """Wait at most `seconds` for a frame; return whether there is one."""
         return bool(self._frames) or self._filled.wait(seconds)
 
     def take(self) -> list[SkeletonFrame]:
-        """One frame of each performer that has moved, oldest first."""
+        """Return the newest frame of each performer that has moved, oldest first."""
         with self._lock:
             frames = list(self._frames.values())
             self._frames.clear()
@@ -75,9 +75,9 @@ class LatestFrames:
 
 
 class AllFrames(Inbox):
-    """Every frame; as many as wait here the bridge sends fewer, so that none is dropped."""
+    """All frames. Waiting frames reduce the publisher's credit, so that none is dropped."""
 
     @property
     def waiting(self) -> int:
-        """Frames that nobody has taken yet."""
+        """Frames that have not been taken yet."""
         return len(self._frames)

@@ -1,13 +1,13 @@
-"""What a bridge and a stage say to each other: versioned binary messages, read without trust.
+"""Binary messages between publisher and subscriber, versioned and validated when decoded.
 
 Every message is one ZeroMQ frame: the magic ``BNRK``, a version byte, a kind byte, two zero bytes,
-then the kind's own fields, little-endian. The first six bytes keep their meaning in every version,
-so that two programs that cannot talk can still say so. The stage says one thing, `Call`: that it is
-there, what it wants, how far it has come, what its clock shows. The bridge says three: `Answer`,
-`Announcement` (the skeleton) and `Sample` (one frame).
+then the fields of the kind, little-endian. The first six bytes keep their meaning in every version,
+so programs of different versions can report the mismatch. The subscriber sends one kind, `Call`:
+its identity, its credit, the frames received so far, and its clock. The publisher sends three:
+`Answer`, `Announcement` (the skeleton) and `Sample` (one frame).
 
-Numbers are float64, so that a recording made on the stage is the one the capture machine would
-have made, bit for bit. A joint that was not seen is NaN with confidence 0.
+Numbers are float64, so a recording made by the subscriber equals one made on the capture machine,
+bit for bit. A joint that was not seen is NaN with confidence 0.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from devices.skeleton import Skeleton, SkeletonFrame
 
 VERSION = 1
 MAX_JOINTS = 1024
-MAX_MESSAGE = 1 << 18  # bytes; a frame of 1024 joints with rotations takes a quarter of it
+MAX_MESSAGE = 1 << 18  # bytes; a frame of 1024 joints with rotations takes a quarter of this
 MAX_CREDIT = 4096
 LATEST, LOSSLESS, LEAVING = 0, 1, 2
 MODES = {"latest": LATEST, "lossless": LOSSLESS}
@@ -45,15 +45,15 @@ _BAD = (ValueError, TypeError, KeyError, OverflowError, RecursionError, InputErr
 
 @dataclass(frozen=True, slots=True)
 class Call:
-    """Stage to bridge: here I am.
+    """Subscriber to publisher: heartbeat, clock request and credit.
 
     Attributes:
-        client: a random number that names this stage for as long as it runs.
-        session: the bridge that it has heard so far; 0 before any.
-        received: the highest sequence number that has come.
-        called_at: its clock [s].
-        credit: how many frames beyond that may be under way, 0 to `MAX_CREDIT`.
-        mode: `LATEST` or `LOSSLESS`; `LEAVING` is its last word.
+        client: random number of the subscriber, constant while it runs.
+        session: the publisher's session that the subscriber has; 0 before any.
+        received: highest sequence number received.
+        called_at: the subscriber's clock [s].
+        credit: number of frames beyond `received` that the publisher may send, 0 to `MAX_CREDIT`.
+        mode: `LATEST` or `LOSSLESS`; `LEAVING` in the last message.
     """
 
     client: int
@@ -66,14 +66,14 @@ class Call:
 
 @dataclass(frozen=True, slots=True)
 class Answer:
-    """Bridge to stage: heard.
+    """Publisher to subscriber: reply to a call.
 
     Attributes:
-        session: a random number that names this run of the bridge.
-        sent: the highest sequence number that went out to this stage before, or that it is not
-            owed because it came too late for it.
-        called_at: the stage's clock [s] as it was in the call.
-        heard_at, answered_at: the bridge's clock [s] when the call came and when this went out.
+        session: random number of this run of the publisher.
+        sent: highest sequence number that this subscriber need not expect any more: sent before
+            this reply, or from before it joined.
+        called_at: the subscriber's clock [s] from the call.
+        heard_at, answered_at: the publisher's clock [s] at receipt of the call and at this reply.
     """
 
     session: int
@@ -85,7 +85,7 @@ class Answer:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Announcement:
-    """Bridge to stage: the skeleton of every frame of this session."""
+    """Publisher to subscriber: the skeleton of every frame of this session."""
 
     session: int
     skeleton: Skeleton
@@ -93,7 +93,7 @@ class Announcement:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sample:
-    """Bridge to stage: one frame, as `SkeletonFrame` has it, but on the bridge's clock [s]."""
+    """Publisher to subscriber: one frame as in `SkeletonFrame`, on the publisher's clock [s]."""
 
     session: int
     sequence: int
@@ -104,7 +104,7 @@ class Sample:
     confidence: NDArray[np.float64]
 
     def frame(self, time: float, arrival: float) -> SkeletonFrame:
-        """The frame, at a time and with an arrival on the stage's clock [s]."""
+        """Return the frame with a time and an arrival on the subscriber's clock [s]."""
         return SkeletonFrame(
             time=time,
             positions=self.positions,
@@ -117,7 +117,7 @@ class Sample:
 
 @dataclass(frozen=True, slots=True)
 class OtherVersion:
-    """A message of a program that speaks another version."""
+    """A message of a program with another version of the protocol."""
 
     version: int
 
@@ -126,19 +126,19 @@ Message = Call | Answer | Announcement | Sample | OtherVersion
 
 
 def encode_call(call: Call) -> bytes:
-    """The bytes of a call."""
+    """Return the bytes of a call."""
     fields = (call.client, call.session, call.received, call.called_at, call.credit, call.mode)
     return _head(1) + _CALL.pack(*fields)
 
 
 def encode_answer(answer: Answer) -> bytes:
-    """The bytes of an answer."""
+    """Return the bytes of an answer."""
     clocks = (answer.called_at, answer.heard_at, answer.answered_at)
     return _head(2) + _ANSWER.pack(answer.session, answer.sent, *clocks)
 
 
 def encode_announcement(session: int, skeleton: Skeleton) -> bytes:
-    """The bytes of an announcement.
+    """Return the bytes of an announcement.
 
     Raises:
         InputError: the skeleton has more than `MAX_JOINTS` joints, or its names are too long.
@@ -154,13 +154,13 @@ def encode_announcement(session: int, skeleton: Skeleton) -> bytes:
     if len(skeleton.names) > MAX_JOINTS or len(data) > MAX_MESSAGE:
         raise InputError(
             f"a skeleton of {len(skeleton.names)} joints is too large for a bridge; "
-            f"at most {MAX_JOINTS} joints and {MAX_MESSAGE // 1024} KiB of names can go over it"
+            f"at most {MAX_JOINTS} joints and {MAX_MESSAGE // 1024} KiB of names can be sent"
         )
     return data
 
 
 def encode_sample(session: int, sequence: int, frame: SkeletonFrame) -> bytes:
-    """The bytes of a frame."""
+    """Return the bytes of a frame."""
     rotations = frame.rotations
     head = (session, sequence, frame.time, frame.performer & 0xFFFFFFFF, len(frame.positions))
     arrays = [frame.positions, frame.confidence, *([] if rotations is None else [rotations])]
@@ -174,7 +174,7 @@ def encode_sample(session: int, sequence: int, frame: SkeletonFrame) -> bytes:
 
 
 def decode(data: bytes) -> Message | None:
-    """The message in `data`; None for anything else. Never raises, whatever the bytes are."""
+    """Return the message in `data`, or None if it is not one. Never raises."""
     if not _HEAD.size <= len(data) <= MAX_MESSAGE:
         return None
     magic, version, kind, reserved = _HEAD.unpack_from(data)

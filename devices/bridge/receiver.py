@@ -1,9 +1,8 @@
-"""The stage's side of a bridge, without sockets: what comes in becomes frames, what to say is told.
+"""Protocol state of a subscriber, without sockets: decodes messages to frames and composes calls.
 
-A stage calls until it is answered, and goes on calling: a call is at once the greeting, the sign of
-life, the question for the other clock, and the word of how far it has come, which lets the bridge
-send more. A bridge that starts anew has a new session; its skeleton comes again, and its numbers
-start from its first frame.
+A subscriber sends calls until it is answered, and continues. A call is the greeting, the heartbeat,
+the clock request and the acknowledgement that gives the publisher new credit. A restarted publisher
+has a new session: its skeleton is sent again, and its sequence numbers start from 1.
 """
 
 from __future__ import annotations
@@ -30,30 +29,30 @@ from devices.bridge.messages import (
 from devices.bridge.sanitize import make_safe
 from devices.skeleton import Skeleton, SkeletonFrame
 
-BEAT = 0.25  # [s] between calls when there is nothing else to say
+BEAT = 0.25  # [s] between calls when there is nothing else to report
 CREDIT = {LATEST: 16, LOSSLESS: 1024}
-"""How many frames may be under way at once: few where only the newest count, so that a slow
-network holds no old ones."""
+"""Credit: frames that may be in transit at once. It is small where only the newest frame counts, so
+that a slow network does not buffer old ones."""
 
-CORRECTION = 0.1  # [s] by which a better knowledge of the other clock may set a time back
-PERFORMERS = 256  # remembered at once
+CORRECTION = 0.1  # [s] by which a better clock offset may move a frame's time back
+PERFORMERS = 256  # performers whose newest time is remembered
 
 
 class BridgeReceiver:
-    """A decoder of what a bridge says, which also knows what to say to it.
+    """Decodes the publisher's messages and composes the calls to it.
 
     Args:
         mode: `LATEST` or `LOSSLESS`.
 
     Attributes:
-        skeleton: of every frame; None before the first announcement. It stays for good.
-        session: the run of the bridge that frames are taken from; 0 before any.
-        other_version: the version that the other side spoke last, if it was not ours.
-        strange: whether the bridge now sends another skeleton than at first, which is refused.
-        refused: messages that were no whole message, or that do not belong here.
-        lost: frames of this bridge that did not come; where the latest win, those left out there.
+        skeleton: of every frame; None before the first announcement, then constant.
+        session: the publisher's session that frames are accepted from; 0 before any.
+        other_version: the other side's version in its last message, if it differs from ours.
+        strange: whether the publisher now sends a different skeleton; its frames are refused.
+        refused: messages that were malformed or out of place.
+        lost: frames of this session that did not arrive, or were skipped by the publisher.
         heard_at: our clock [s] at the last answer; minus infinity before any.
-        clock: how far the bridge's clock is from ours.
+        clock: offset of the publisher's clock.
     """
 
     def __init__(self, mode: int) -> None:
@@ -68,18 +67,18 @@ class BridgeReceiver:
         self._mode = mode
         self._client = secrets.randbits(64)
         self._announced = 0  # the session whose skeleton is known
-        self._came = 0  # the highest sequence number that came
-        self._told = 0  # the highest that the bridge was last told it may send
+        self._came = 0  # the highest sequence number received
+        self._granted = 0  # the highest sequence number that the publisher may send
         self._called_at = float("-inf")
         self._last: dict[int, float] = {}  # each performer's newest time [s]
-        make_safe(np.zeros((1, 3)), np.zeros(1), np.zeros((1, 4)))  # compiled before a frame comes
+        make_safe(np.zeros((1, 3)), np.zeros(1), np.zeros((1, 4)))  # compile before the first frame
 
     def feed(self, data: bytes, arrival: float) -> Sequence[SkeletonFrame]:
-        """The frame in one message, on our clock; nothing for any other message. Never raises.
+        """Return the frame in one message, on our clock; nothing for other messages. Never raises.
 
         Args:
             data: one message.
-            arrival: our clock [s] when it came; becomes the frame's.
+            arrival: our clock [s] at its receipt; becomes the frame's arrival.
         """
         match decode(data):
             case Sample() as sample:
@@ -95,25 +94,25 @@ class BridgeReceiver:
         return []
 
     def call_due(self, now: float, waiting: int = 0) -> bool:
-        """Whether the bridge should hear from us: a beat has passed, or it may soon run dry.
+        """Whether a call should be sent: a beat has passed, or the publisher may run out of credit.
 
         Args:
             now: our clock [s].
-            waiting: frames that came and wait to be taken; so many fewer are asked for, so that a
-                stage that stands still holds the bridge back.
+            waiting: received frames that are not taken yet. They reduce the credit, so a paused
+                frame loop pauses the publisher.
         """
-        more = self._came + self._credit(waiting) - self._told
+        more = self._came + self._credit(waiting) - self._granted
         return now - self._called_at >= BEAT or more >= CREDIT[self._mode] // 4
 
     def call(self, now: float, waiting: int = 0) -> bytes:
-        """What to say to the bridge at this time [s]; `waiting` as for `call_due`."""
+        """Return the call to send at this time [s]; `waiting` as for `call_due`."""
         credit = self._credit(waiting)
         self._called_at = now
-        self._told = self._came + credit
+        self._granted = self._came + credit
         return encode_call(Call(self._client, self._announced, self._came, now, credit, self._mode))
 
     def farewell(self, now: float) -> bytes:
-        """The last word, so that the bridge keeps nothing for us."""
+        """Return the last message, after which the publisher keeps nothing for us."""
         return encode_call(Call(self._client, self._announced, self._came, now, 0, LEAVING))
 
     def _credit(self, waiting: int) -> int:
@@ -124,8 +123,8 @@ class BridgeReceiver:
             self.session = answer.session
             self.clock = ClockOffset()
             self._came = answer.sent
-            self._told = 0
-        # Nothing overtakes: what was sent before this has come. A number far ahead was false.
+            self._granted = 0
+        # Messages arrive in order: frames sent before this answer have arrived or are lost.
         elif answer.sent > self._came:
             self.lost += answer.sent - self._came
             self._came = answer.sent
@@ -147,11 +146,11 @@ class BridgeReceiver:
         self.strange = not _alike(self.skeleton, announcement.skeleton)
 
     def _sample(self, sample: Sample, arrival: float) -> Sequence[SkeletonFrame]:
-        welcome = sample.session == self.session == self._announced and self.clock.known
-        if not welcome or self.strange or not self._fits(sample):
+        accepted = sample.session == self.session == self._announced and self.clock.known
+        if not accepted or self.strange or not self._fits(sample):
             self.refused += 1
             return []
-        if sample.sequence <= self._came:  # sent again after a break, though it had come before it
+        if sample.sequence <= self._came:  # sent again after a reconnect, received before it
             return []
         self.lost += sample.sequence - self._came - 1
         self._came = sample.sequence
@@ -162,7 +161,7 @@ class BridgeReceiver:
         return self.skeleton is not None and len(sample.positions) == len(self.skeleton.names)
 
     def _rising(self, performer: int, time: float) -> float:
-        """The time, but for what a better knowledge of the other clock takes back."""
+        """`time` [s], kept from falling where the estimate of the other clock improves."""
         last = self._last.get(performer, time)
         if 0.0 < last - time <= CORRECTION:
             time = last

@@ -1,4 +1,4 @@
-"""What the numbers of a frame from another machine may be, whatever they say."""
+"""Replace invalid numbers in a frame that was received from another machine."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from devices.compiled import kernel
 
 Array = NDArray[np.float64]
 
-_UNIT = 1e-6  # how far from 1 the length of a unit quaternion may be
-_LARGEST = 1e6  # of a quaternion's numbers
+_UNIT = 1e-6  # largest deviation from 1 of the length of a unit quaternion
+_LARGEST = 1e6  # largest component of a quaternion
 
 
 @kernel
 def make_safe(positions: Array, confidence: Array, quaternions: Array) -> None:
-    """Put right, in place, what no sensor says.
+    """Correct impossible numbers in place.
 
     Args:
-        positions: (J, 3) [m]; NaN where one of the three is not finite.
-        confidence: (J,) into [0, 1], 0 where there is no position.
-        quaternions: (J, 4), or (0, 4) where there are none. Unit ones stay to the last bit, others
-            are made so, NaN where that cannot be.
+        positions: (J, 3) [m]; set to NaN where a coordinate is not finite.
+        confidence: (J,) clipped to [0, 1]; set to 0 where there is no position.
+        quaternions: (J, 4), or (0, 4) if there are none. Unit quaternions keep every bit, others
+            are normalised, or set to NaN where that is impossible.
     """
     for joint in range(len(positions)):
         x, y, z = positions[joint]

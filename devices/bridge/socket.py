@@ -1,4 +1,4 @@
-"""ZeroMQ sockets as both ends of a bridge use them: bounded, watched, guarded, and soon back.
+"""ZeroMQ sockets for both ends of a bridge: bounded queues, heartbeats, encryption, reconnection.
 
 Source: https://libzmq.readthedocs.io/en/latest/zmq_setsockopt.html and zmq_socket_monitor.html.
 """
@@ -14,10 +14,10 @@ from devices.bridge.keys import PublisherKeys, SubscriberKeys
 from devices.bridge.messages import MAX_MESSAGE
 
 DOMAIN = "bunraku"
-_SIGN_OF_LIFE = 500  # [ms] between ZeroMQ's own heartbeats
-_DEAD = 2000  # [ms] without one, after which a connection is taken for broken
+_HEARTBEAT = 500  # [ms] between ZeroMQ's own heartbeats
+_DEAD = 2000  # [ms] without a heartbeat, after which a connection counts as broken
 _RECONNECT = (100, 1000)  # [ms] first and longest pause before the next attempt
-_LAST_WORD = 100  # [ms] that closing waits for what was said last
+_LINGER = 100  # [ms] that closing waits for the last message
 _QUEUE = 1000  # messages that wait to be read
 
 Socket = zmq.Socket[bytes]
@@ -25,11 +25,11 @@ Context = zmq.Context[Socket]
 
 
 class Handshake(Enum):
-    """What became of an attempt to get into connection."""
+    """The result of an attempt to connect."""
 
     DONE = "done"
     KEY_REFUSED = "the key is not among those that are allowed"
-    FAILED = "one side has keys and the other has not, or they do not belong together"
+    FAILED = "one side has keys and the other has none, or the keys do not belong together"
 
 
 _OUTCOMES = {
@@ -43,22 +43,22 @@ _OUTCOMES = {
 def bridge_socket(
     context: Context, kind: int, endpoint: str, keys: PublisherKeys | SubscriberKeys | None
 ) -> Socket:
-    """A socket for `endpoint`, a ROUTER at the bridge and a DEALER at the stage.
+    """Return a socket for `endpoint`: a ROUTER at the publisher, a DEALER at the subscriber.
 
-    With `keys` of a bridge only the stages in it are let in, provided that an authenticator runs in
-    this context; without one nobody is.
+    With `keys` of a publisher only its allowed subscribers can connect, provided that an
+    authenticator runs in this context; without an authenticator none can.
     """
     socket = context.socket(kind)
-    socket.linger = _LAST_WORD
+    socket.linger = _LINGER
     socket.ipv6 = "[" in endpoint
     socket.maxmsgsize = MAX_MESSAGE
     socket.rcvhwm = _QUEUE
-    socket.sndhwm = 0  # what is under way is bounded by the stage's credit
-    socket.heartbeat_ivl = _SIGN_OF_LIFE
+    socket.sndhwm = 0  # the subscriber's credit bounds the frames in transit
+    socket.heartbeat_ivl = _HEARTBEAT
     socket.heartbeat_timeout = _DEAD
     socket.reconnect_ivl, socket.reconnect_ivl_max = _RECONNECT
     if kind == zmq.DEALER:
-        socket.immediate = True  # a call that waits for a connection asks for an old time
+        socket.immediate = True  # a call queued until a connection exists would carry an old time
     if keys is not None:
         socket.curve_publickey, socket.curve_secretkey = keys.public, keys.secret
     if isinstance(keys, SubscriberKeys):
@@ -71,10 +71,10 @@ def bridge_socket(
 
 
 class Handshakes:
-    """Watches what becomes of a socket's handshakes.
+    """Observes the handshakes of a socket.
 
     Attributes:
-        monitor: can be polled beside the socket.
+        monitor: socket to poll beside the observed one.
     """
 
     def __init__(self, socket: Socket) -> None:
@@ -82,23 +82,23 @@ class Handshakes:
         self.monitor: Socket = socket.get_monitor_socket(sum(_OUTCOMES))
 
     def news(self) -> list[Handshake]:
-        """What has happened since the last call."""
+        """Return the results since the last call."""
         found = []
         while self.monitor.poll(0):
             found.append(_OUTCOMES[zmq.Event(recv_monitor_message(self.monitor)["event"])])
         return found
 
     def close(self) -> None:
-        """Stop watching; before the socket is closed."""
+        """Stop observing; call before the socket is closed."""
         self._socket.disable_monitor()
         self.monitor.close()
 
 
 def tcp_endpoint(host: str, port: int | str) -> str:
-    """ZeroMQ's way of writing a TCP address."""
+    """Return a TCP address in ZeroMQ's notation."""
     return f"tcp://[{host}]:{port}" if ":" in host else f"tcp://{host}:{port}"
 
 
 def bound_endpoint(socket: Socket) -> str:
-    """Where a socket listens, with the port that the system gave it."""
+    """Return the address at which a socket listens, with the port that the system chose."""
     return str(socket.getsockopt_string(zmq.LAST_ENDPOINT))

@@ -1,8 +1,8 @@
-"""A performer on another machine: ``zmq+tcp://HOST:PORT``, where `bunraku bridge` sends frames.
+"""Device ``zmq+tcp://HOST:PORT``: frames that `bunraku bridge` publishes on another machine.
 
-Options: ``mode=latest`` (a frame that is overtaken by a newer one of its performer is left out) or
-``mode=lossless`` (every frame, in order); ``keys=DIR`` for anything beyond this machine;
-``wait=SECONDS`` for the bridge to be there at the start.
+Options: ``mode=latest`` (a frame is skipped when a newer one of its performer exists) or
+``mode=lossless`` (every frame, in order); ``keys=DIR`` for any address beyond this machine;
+``wait=SECONDS`` for the publisher at the start.
 """
 
 from __future__ import annotations
@@ -29,21 +29,21 @@ from devices.skeleton import Skeleton, SkeletonFrame
 from devices.transport.traffic import Rhythm, Traffic
 
 PORT = 5570
-PATIENCE = 10.0  # [s] for the bridge to be there at the start
-SILENT = 2.0  # [s] without an answer after which a bridge is taken to be away
-GLANCE = 20  # [ms] between looks at what the loop has taken, and at whether we are closed
-AT_ONCE = 256  # messages after which the reader pauses as long as it has worked
+PATIENCE = 10.0  # [s] for the publisher to answer at the start
+SILENT = 2.0  # [s] without an answer, after which the publisher counts as absent
+GLANCE = 20  # [ms] between checks of the queue and of the closing flag
+AT_ONCE = 256  # messages after which the reader pauses for as long as it has worked
 
 
 @dataclass(frozen=True, slots=True)
 class Bridge:
-    """Where a bridge is and how to cross it.
+    """Address and settings of a connection to a publisher.
 
     Attributes:
-        endpoint: as ZeroMQ writes it.
+        endpoint: in ZeroMQ's notation.
         mode: `LATEST` or `LOSSLESS`.
         keys: for CURVE, or None on this machine.
-        patience: how long [s] to wait for its first word.
+        patience: time [s] to wait for the first answer.
     """
 
     endpoint: str
@@ -53,16 +53,16 @@ class Bridge:
 
 
 class BridgeStream:
-    """A `SkeletonStream` over a bridge; one thread talks with it and stamps what comes.
+    """A `SkeletonStream` over a bridge; one thread exchanges messages and stamps arrivals.
 
-    It finds a bridge that goes away and comes back, or one that takes its place.
+    It reconnects when the publisher returns, or when another one takes its place.
 
     Args:
-        bridge: where it is.
+        bridge: address and settings.
         clock: host monotonic time [s].
 
     Raises:
-        InputError: no bridge answers in time, it refuses our key, or it speaks another version.
+        InputError: no publisher answers in time, it refuses our key, or its version differs.
     """
 
     def __init__(self, bridge: Bridge, clock: Callable[[], float] = time.perf_counter) -> None:
@@ -78,7 +78,7 @@ class BridgeStream:
         self._last_seen = float("nan")
         self._handshake = Handshake.DONE
         self._closing = threading.Event()
-        self._told = threading.Event()  # the skeleton, or why there will be none
+        self._decided = threading.Event()  # the skeleton has come, or a reason why it will not
         self._context: Context = zmq.Context()
         self._socket = bridge_socket(self._context, zmq.DEALER, bridge.endpoint, bridge.keys)
         self._handshakes = Handshakes(self._socket)
@@ -87,13 +87,13 @@ class BridgeStream:
         except zmq.ZMQError as error:
             self._release()
             raise InputError(f"cannot open {bridge.endpoint}: {error.strerror}") from error
-        self._thread = threading.Thread(target=self._talk, name="bridge", daemon=True)
+        self._thread = threading.Thread(target=self._run, name="bridge", daemon=True)
         self._thread.start()
         self._wait_for_skeleton()
 
     @property
     def skeleton(self) -> Skeleton:
-        """The skeleton that the bridge announced first."""
+        """The skeleton that the publisher announced first."""
         if self._receiver.skeleton is None:
             raise InputError(self._trouble())
         return self._receiver.skeleton
@@ -105,7 +105,7 @@ class BridgeStream:
 
     @property
     def traffic(self) -> Traffic:
-        """What has come so far; `dropped` counts what was left out on either side."""
+        """Counters of the received data; `dropped` includes frames skipped by the publisher."""
         rate, jitter = self._rhythm.measure(self._clock())
         return Traffic(
             packets=self._packets,
@@ -119,22 +119,22 @@ class BridgeStream:
         )
 
     def tap(self, listener: Callable[[SkeletonFrame], None]) -> None:
-        """Show every frame from now on to `listener`, in order, on the bridge's thread.
+        """Pass every frame from now on to `listener`, in order, on the bridge's thread.
 
-        The listener must neither wait nor raise.
+        The listener must not wait or raise.
         """
         self._listeners = (*self._listeners, listener)
 
     def poll(self) -> Sequence[SkeletonFrame]:
-        """What has come since the last poll, oldest first; never blocks."""
+        """Return the frames since the last poll, oldest first; never blocks."""
         return [] if self.ended else self._inbox.take()
 
     def wait(self, seconds: float) -> bool:
-        """Sleep until a frame is there, at most so long; whether one is."""
+        """Wait at most `seconds` for a frame; return whether there is one."""
         return self._inbox.wait(seconds)
 
     def close(self) -> None:
-        """Hang up; may be called twice."""
+        """Disconnect; may be called twice."""
         if not self._closing.is_set():
             self._closing.set()
             self._thread.join()
@@ -147,7 +147,7 @@ class BridgeStream:
 
     def _wait_for_skeleton(self) -> None:
         try:
-            self._told.wait(self._bridge.patience)
+            self._decided.wait(self._bridge.patience)
             if self._receiver.skeleton is None:
                 raise InputError(f"cannot open {self._bridge.endpoint}: {self._trouble()}")
         except BaseException:  # Ctrl-C as well
@@ -155,7 +155,7 @@ class BridgeStream:
             raise
 
     def _trouble(self) -> str:
-        """One line on what is wrong just now, or an empty one."""
+        """One line that describes the current fault, or an empty one."""
         receiver, now = self._receiver, self._clock()
         if self._handshake is Handshake.KEY_REFUSED:
             return "the bridge refused our key; its folder `allowed` must hold our public key"
@@ -169,11 +169,11 @@ class BridgeStream:
         if now - receiver.heard_at <= SILENT:
             return ""
         if self._handshake is Handshake.FAILED:
-            return f"no understanding with the bridge: {self._handshake.value}"
+            return f"no connection to the bridge: {self._handshake.value}"
         return "no bridge answers; is `bunraku bridge` running there, at this address?"
 
-    def _talk(self) -> None:
-        """Call and listen until closed, on a thread of its own."""
+    def _run(self) -> None:
+        """Send calls and receive messages until closed, on a thread of its own."""
         poller = zmq.Poller()
         poller.register(self._socket, zmq.POLLIN)
         poller.register(self._handshakes.monitor, zmq.POLLIN)
@@ -184,21 +184,21 @@ class BridgeStream:
                 if self._handshakes.monitor in found:
                     self._shake_hands()
                 if self._socket in found:
-                    self._listen()
-            self._say(self._receiver.farewell(self._clock()))
+                    self._receive()
+            self._send(self._receiver.farewell(self._clock()))
         finally:
             self._release()
 
     def _call(self) -> None:
         now, waiting = self._clock(), self._inbox.waiting
         if self._receiver.call_due(now, waiting):
-            self._say(self._receiver.call(now, waiting))
+            self._send(self._receiver.call(now, waiting))
 
-    def _say(self, data: bytes) -> None:
-        with suppress(zmq.Again):  # no connection just now; the next call will do
+    def _send(self, data: bytes) -> None:
+        with suppress(zmq.Again):  # no connection now; the next call will do
             self._socket.send(data, zmq.NOBLOCK)
 
-    def _listen(self) -> None:
+    def _receive(self) -> None:
         began = self._clock()
         for _ in range(AT_ONCE):
             try:
@@ -207,7 +207,7 @@ class BridgeStream:
                 return
             self._take_in(data, self._clock())
             self._call()
-        # More than a bridge should send: the rest of the program gets its share of time.
+        # More messages than a publisher should send: yield time to the rest of the program.
         self._closing.wait(self._clock() - began)
 
     def _take_in(self, data: bytes, arrival: float) -> None:
@@ -219,21 +219,21 @@ class BridgeStream:
             for listener in self._listeners:
                 listener(frame)
         self._frames += len(frames)
-        if not self._told.is_set():
-            self._tell()
-        self._inbox.put(frames)  # last: who wakes needs the interpreter that this thread holds
+        if not self._decided.is_set():
+            self._decide()
+        self._inbox.put(frames)  # last: the woken thread needs the interpreter that this one holds
 
-    def _tell(self) -> None:
-        """Wake who opens us, once there is a skeleton or a reason why there will be none."""
+    def _decide(self) -> None:
+        """Wake the opening thread once there is a skeleton or a version mismatch."""
         if self._receiver.skeleton is not None or self._receiver.other_version is not None:
-            self._told.set()
+            self._decided.set()
 
     def _shake_hands(self) -> None:
         for outcome in self._handshakes.news():
             self._handshake = outcome
             if outcome is Handshake.KEY_REFUSED:
-                self._told.set()
-                # ZeroMQ gives up on such a bridge; another may come that knows us.
+                self._decided.set()
+                # ZeroMQ stops trying such a publisher; another that accepts our key may follow.
                 self._socket.disconnect(self._bridge.endpoint)
                 self._closing.wait(SILENT)
                 self._socket.connect(self._bridge.endpoint)
@@ -248,7 +248,7 @@ def open_device(address: SplitResult) -> BridgeStream:
     """Open ``zmq+tcp://HOST:PORT``."""
     host, port = host_and_port(address, PORT)
     if port == 0:
-        raise InputError(f"cannot open {address.geturl()!r}: give the port that the bridge tells")
+        raise InputError(f"cannot open {address.geturl()!r}: give the port that the bridge prints")
     options = options_of(address, {"mode": one_of(*MODES), "keys": Path, "wait": positive})
     keys: Path | None = options.get("keys")
     check_guarded(host, keys=keys, option=f"`?keys=DIR/stage` in {address.geturl()}")

@@ -1,1 +1,1 @@
-"""The built-in performer, who needs no hardware: `sim://`."""
+"""The built-in performer, which needs no hardware: `sim://`."""

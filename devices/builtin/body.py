@@ -1,7 +1,7 @@
-"""The body of the built-in performer: Kinect v2's joints, with hands that have fingers.
+"""Skeleton of the built-in performer: Kinect v2's joints, with hands that have fingers.
 
-It is 1.72 m tall and stands at rest with its arms 45 degrees away from it and its palms to the
-front, so that each limb points where no other does. Metres, +Y up, facing +Z, left on +X.
+The body is 1.72 m tall. At rest its arms hang 45 degrees away from it with the palms to the front,
+so that no two limbs point in the same direction. Metres, +Y up, facing +Z, left on +X.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from devices.skeleton import Skeleton
 
 Array = NDArray[np.float64]
 
-# (joint, parent, offset from the parent); of limbs the left one, the right one is its mirror image.
+# (joint, parent, offset from the parent); the right limbs are mirror images of these left ones
 _TRUNK = (
     ("SpineBase", "", (0.0, 0.93, 0.0)),
     ("SpineMid", "SpineBase", (0.0, 0.24, -0.01)),
@@ -36,7 +36,7 @@ SOLE = 0.03
 """Height [m] of the foot joints above the floor at rest."""
 FINGERS = ("Thumb", "Index", "Middle", "Ring", "Little")
 _SPREAD = np.radians([52.0, 17.0, 2.0, -13.0, -29.0])  # from the hand's direction, thumb side up
-_REACH = (0.030, 0.046, 0.046, 0.043, 0.040)  # from the middle of the palm to the knuckle [m]
+_REACH = (0.030, 0.046, 0.046, 0.043, 0.040)  # [m] from the middle of the palm to the knuckle
 _LENGTHS = {
     "Thumb": (0.034, 0.028),
     "Index": (0.042, 0.025, 0.022),
@@ -48,18 +48,18 @@ _BONES = {2: ("Proximal", "Distal", "Tip"), 3: ("Proximal", "Intermediate", "Dis
 
 
 def finger_joints(side: str, finger: str) -> tuple[str, ...]:
-    """The joints of one finger from the knuckle to the tip, e.g. ("LeftIndexProximal", ...)."""
+    """Return the joints of one finger from knuckle to tip, e.g. ("LeftIndexProximal", ...)."""
     return tuple(f"{side}{finger}{bone}" for bone in _BONES[len(_LENGTHS[finger])])
 
 
 def finger_direction(finger: str) -> Array:
-    """Where a finger of the left hand points at rest: a unit vector (3,)."""
+    """Return the rest direction of a finger of the left hand: a unit vector (3,)."""
     angle = np.arctan2(-0.052, 0.058) + _SPREAD[FINGERS.index(finger)]
     return np.array([np.cos(angle), np.sin(angle), 0.0])
 
 
 def builtin_skeleton() -> Skeleton:
-    """The built-in performer's skeleton, 59 joints, standing on y = 0 with 3 cm of foot below."""
+    """Return the 59 joints, standing on y = 0, with 3 cm of foot below the foot joints."""
     joints: list[tuple[str, str, Array]] = [
         (name, parent, np.array(offset)) for name, parent, offset in _TRUNK
     ]

@@ -1,9 +1,9 @@
-"""The built-in performance: what the puppet body does, as gestures on its joints.
+"""Gestures on single joints, and their conversion to the frames of a built-in motion.
 
-A gesture turns one joint. It eases in and out with continuous acceleration, draws back a little
-before it starts and swings a little past where it stops; what lies further out on a limb follows
-later. An act is a list of gestures that begins and ends at rest, so that it loops and so that acts
-can be strung together into the show.
+A gesture turns one joint. It starts and stops with continuous acceleration, draws back a little
+before it starts and swings a little past its end; joints further out on a limb follow later. A
+built-in motion is a list of gestures that begins and ends at rest, so it loops and can be joined
+with others.
 
 Source: F. Thomas, O. Johnston, "The Illusion of Life", 1981, chapter 3 (anticipation, follow
 through and overlapping action).
@@ -25,22 +25,22 @@ Array = NDArray[np.float64]
 Turn = tuple[float, float, float]
 
 RATE = 60.0
-"""Frames a second."""
+"""Frames per second."""
 
 
 @dataclass(frozen=True, slots=True)
 class Gesture:
-    """A turn of one joint, against its parent.
+    """A rotation of one joint relative to its parent.
 
     Attributes:
-        joint: which one.
+        joint: name of the joint.
         turn: rotation vector (3,) [rad] in the rest pose's axes, at full swing.
-        begin, end: when it leaves rest and when it starts back [s].
-        ease: how long it takes to get there, and back again [s].
-        frequency: how often it swings to and fro in between [Hz]; 0 holds it there.
-        phase: of the swing [rad].
-        lift: 1 where it only swings one way, between rest and full swing, like a leg that steps;
-            0 where it swings to both sides.
+        begin, end: times [s] at which it leaves rest and starts to return.
+        ease: duration [s] of the way there, and of the way back.
+        frequency: of the oscillation in between [Hz]; 0 keeps it at full swing.
+        phase: of the oscillation [rad].
+        lift: 1 if it oscillates between rest and full swing, like a leg that steps; 0 if it
+            oscillates to both sides.
     """
 
     joint: str
@@ -55,7 +55,7 @@ class Gesture:
 
 @dataclass(frozen=True, slots=True)
 class BuiltinMotion:
-    """Gestures over `seconds`, from rest to rest."""
+    """Gestures over `seconds` [s], from rest to rest."""
 
     seconds: float
     gestures: tuple[Gesture, ...]
@@ -63,11 +63,11 @@ class BuiltinMotion:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MotionClip:
-    """An act played by the puppet body, one loop of it.
+    """One loop of a built-in motion as frames.
 
     Attributes:
         skeleton: of all frames.
-        times: (T,) [s] from 0, evenly spaced; the frame after the last is the first.
+        times: (T,) [s] from 0, evenly spaced; the first frame follows the last.
         positions: (T, J, 3) [m].
         rotations: (T, J, 4) quaternions (x, y, z, w), joint to world, identity at rest.
     """
@@ -79,7 +79,7 @@ class MotionClip:
 
 
 def smooth_step(x: Array) -> Array:
-    """From 0 at x = 0 to 1 at x = 1, with no velocity or acceleration at either end."""
+    """Rise from 0 at x = 0 to 1 at x = 1, with zero velocity and acceleration at both ends."""
     x = np.clip(x, 0.0, 1.0)
     step: Array = x**3 * (10.0 + x * (6.0 * x - 15.0))
     return step
@@ -92,7 +92,7 @@ def _bump(x: Array) -> Array:
 
 
 def swing(gesture: Gesture, times: Array) -> Array:
-    """How far (T,) the gesture is out at each time: 0 at rest, 1 at full swing."""
+    """Return the amplitude (T,) of the gesture at each time: 0 at rest, 1 at full swing."""
     window = smooth_step((times - gesture.begin) / gesture.ease) - smooth_step(
         (times - gesture.end) / gesture.ease
     )
@@ -107,15 +107,15 @@ def swing(gesture: Gesture, times: Array) -> Array:
     return out
 
 
-def sample_motion(act: BuiltinMotion) -> MotionClip:
-    """The act as frames: forward kinematics with constant bones, the lowest foot on the floor."""
+def sample_motion(motion: BuiltinMotion) -> MotionClip:
+    """Return the motion as frames: forward kinematics, constant bones, lower foot on the floor."""
     skeleton = builtin_skeleton()
-    count = round(act.seconds * RATE)
+    count = round(motion.seconds * RATE)
     times = np.arange(count) / RATE
     turns = np.zeros((len(skeleton.names), count, 3))
-    for gesture in act.gestures:
-        # What a gesture leaves beyond the act's end goes on at its beginning.
-        for shift in (-act.seconds, 0.0, act.seconds):
+    for gesture in motion.gestures:
+        # The part of a gesture beyond the motion's end continues at its beginning.
+        for shift in (-motion.seconds, 0.0, motion.seconds):
             moved = swing(gesture, times - shift)[:, None] * np.array(gesture.turn)
             turns[skeleton.index(gesture.joint)] += moved
     positions, rotations = _forward(skeleton, turns)
@@ -141,7 +141,7 @@ def _forward(skeleton: Skeleton, turns: Array) -> tuple[Array, Array]:
 
 
 def _floor(skeleton: Skeleton, positions: Array) -> Array:
-    """How far (T,) [m] the lower foot is above its rest; a soft minimum, so no step is felt."""
+    """Height (T,) [m] of the lower foot above its rest; a soft minimum avoids jumps."""
     feet = [skeleton.index(f"{part}{side}") for part in ("Foot", "Ankle") for side in SIDES]
     raised = positions[:, feet, 1] - skeleton.rest_positions[feet, 1]
     softness = 0.006

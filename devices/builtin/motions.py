@@ -1,4 +1,4 @@
-"""What the built-in performer can do: five acts, and the show that strings them together."""
+"""The built-in motions: five single ones, and the show that joins them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _FORWARD = np.array([-0.66, -0.74, 0.0])  # turns the left forearm towards the f
 
 
 def _mirrored(side: str, turn: Turn) -> Turn:
-    """A turn given for the left, as the `side` does it."""
+    """A rotation given for the left, converted to `side`."""
     return turn if side == "Left" else (turn[0], -turn[1], -turn[2])
 
 
@@ -31,7 +31,7 @@ def _both(joint: str, turn: Turn, **when: float) -> Iterator[Gesture]:
 
 
 def _curl(side: str, by: float, lag: float = 0.0, **when: float) -> Iterator[Gesture]:
-    """Every finger bends by `by` [rad] at each joint; each starts `lag` [rad] after the last."""
+    """Bend every finger by `by` [rad] at each joint; each is `lag` [rad] behind the previous."""
     for number, finger in enumerate(FINGERS):
         along_x, along_y, _ = by * finger_direction(finger)
         turn = _mirrored(side, (along_y, -along_x, 0.0))  # along x front: towards the palm
@@ -41,20 +41,20 @@ def _curl(side: str, by: float, lag: float = 0.0, **when: float) -> Iterator[Ges
 
 
 def _spread(side: str, by: float, **when: float) -> Iterator[Gesture]:
-    """The fingers fan out, the outer ones by `by` [rad]."""
+    """Spread the fingers, the outer ones by `by` [rad]."""
     for finger, share in zip(FINGERS, (1.0, 0.5, 0.0, -0.5, -1.0), strict=True):
         turn = _mirrored(side, (0.0, 0.0, share * by))
         yield Gesture(finger_joints(side, finger)[0], turn, **when)
 
 
 def _knees(by: float, **when: float) -> Iterator[Gesture]:
-    """The knees bend, the trunk stays upright."""
+    """Bend the knees; the trunk stays upright."""
     for joint, turn in (("Hip", -by), ("Knee", 2.0 * by), ("Ankle", -by)):
         yield from _both(joint, (turn, 0.0, 0.0), **when)
 
 
 def _sway(by: float, **when: float) -> Iterator[Gesture]:
-    """The hips tip sideways; the legs stay upright, chest and head keep the balance."""
+    """Tilt the hips sideways; the legs stay upright, chest and head compensate."""
     yield Gesture("SpineBase", (0.0, 0.0, by), **when)
     for side in SIDES:
         yield Gesture(f"Hip{side}", (0.0, 0.0, -by), **when)
@@ -63,29 +63,29 @@ def _sway(by: float, **when: float) -> Iterator[Gesture]:
 
 
 def _wave() -> BuiltinMotion:
-    """A friendly wave of the right hand, head and trunk joining in."""
-    held, waving = {"begin": 0.35, "end": 2.55}, {"begin": 0.75, "end": 2.35, "ease": 0.4}
+    """A wave of the right hand; head and trunk take part."""
+    raised, waving = {"begin": 0.35, "end": 2.55}, {"begin": 0.75, "end": 2.35, "ease": 0.4}
     gestures = (
-        _limb("Shoulder", "Right", (0.0, 0.0, 1.20), **held, ease=0.55),
+        _limb("Shoulder", "Right", (0.0, 0.0, 1.20), **raised, ease=0.55),
         _limb("Elbow", "Right", (0.0, 0.0, 0.85), begin=0.45, end=2.62, ease=0.55),
         _limb("Shoulder", "Right", (0.0, 0.0, 0.10), **waving, frequency=2.0),
         _limb("Elbow", "Right", (0.0, 0.0, 0.50), **waving, frequency=2.0, phase=-0.5),
         _limb("Wrist", "Right", (0.0, 0.0, 0.40), **waving, frequency=2.0, phase=-1.3),
         *_spread("Right", 0.16, begin=0.55, end=2.5, ease=0.5),
         *_curl("Right", -0.10, begin=0.55, end=2.5, ease=0.5),
-        _limb("Shoulder", "Left", (0.0, 0.0, -0.16), **held, ease=0.7),
+        _limb("Shoulder", "Left", (0.0, 0.0, -0.16), **raised, ease=0.7),
         _limb("Elbow", "Left", (0.0, 0.0, 0.22), begin=0.45, end=2.6, ease=0.7),
-        Gesture("SpineMid", (0.0, 0.0, -0.10), **held, ease=0.7),
+        Gesture("SpineMid", (0.0, 0.0, -0.10), **raised, ease=0.7),
         Gesture("Neck", (0.0, 0.0, 0.20), begin=0.45, end=2.6, ease=0.6),
         Gesture("Neck", (0.0, 0.0, 0.06), **waving, frequency=1.0),
-        *_sway(0.05, **held, ease=0.8),
+        *_sway(0.05, **raised, ease=0.8),
         *_knees(0.10, **waving, frequency=2.0, phase=-np.pi / 2, lift=1.0),
     )
     return BuiltinMotion(3.3, gestures)
 
 
 def _arms() -> BuiltinMotion:
-    """Wings, then a wave that runs from hand to hand, then both arms up."""
+    """Both arms beat like wings, a wave runs from hand to hand, then both arms rise."""
     out = {"begin": 0.2, "end": 4.35}
     wings = {"begin": 0.45, "end": 1.85, "ease": 0.45, "frequency": 1.15}
     snake = {"begin": 2.0, "end": 3.35, "ease": 0.5, "frequency": 1.0}
@@ -113,7 +113,7 @@ def _arms() -> BuiltinMotion:
 
 
 def _walk() -> BuiltinMotion:
-    """Walking on the spot, knees high and arms swinging."""
+    """Walk on the spot with high knees and swinging arms."""
     steps = {"begin": 0.25, "end": 3.05, "ease": 0.5, "frequency": 1.25}
     gestures: list[Gesture] = [
         *_both("Shoulder", (0.0, 0.0, -0.30), begin=0.15, end=3.1),
@@ -138,20 +138,20 @@ def _walk() -> BuiltinMotion:
 
 
 def _fingers() -> BuiltinMotion:
-    """Both hands up, fingers rippling as if on a keyboard in the air."""
-    held, play = {"begin": 0.2, "end": 2.55}, {"begin": 0.6, "end": 2.4, "ease": 0.4}
+    """Both hands up, with rippling fingers."""
+    raised, play = {"begin": 0.2, "end": 2.55}, {"begin": 0.6, "end": 2.4, "ease": 0.4}
     roll = {**play, "frequency": 0.9}
     gestures: list[Gesture] = [
-        *_both("Shoulder", (0.0, 0.0, 0.42), **held, ease=0.55),
+        *_both("Shoulder", (0.0, 0.0, 0.42), **raised, ease=0.55),
         *_both("Elbow", (0.0, 0.0, 1.45), begin=0.28, end=2.6, ease=0.55),
         *_both("Shoulder", (0.0, 0.0, 0.12), **roll, phase=0.8),
         *_sway(0.06, **roll),
         Gesture("Neck", (0.0, 0.0, 0.12), **roll, phase=-0.9),
-        Gesture("Head", (-0.10, 0.0, 0.0), **held),
+        Gesture("Head", (-0.10, 0.0, 0.0), **raised),
         *_knees(0.07, **play, frequency=1.8, lift=1.0),
     ]
     for side, late in (("Left", 0.0), ("Right", 1.4)):
-        gestures += _spread(side, 0.16, **held, ease=0.5)
+        gestures += _spread(side, 0.16, **raised, ease=0.5)
         gestures += _curl(side, 0.24, begin=0.35, end=2.5, ease=0.5)
         gestures += _curl(side, 0.30, 0.85, **play, frequency=2.3, phase=-late)
         gestures.append(_limb("Wrist", side, (0.0, 0.0, 0.28), **roll, phase=-late))
@@ -159,7 +159,7 @@ def _fingers() -> BuiltinMotion:
 
 
 def _bow() -> BuiltinMotion:
-    """A deep bow with a flourish, as at the end of a show."""
+    """A deep bow with a sweep of the arm."""
     down = {"begin": 0.35, "end": 1.45, "ease": 0.7}
     gestures = (
         Gesture("SpineBase", (0.42, 0.0, 0.0), **down),
@@ -183,7 +183,7 @@ def _turn(vector: NDArray[np.float64]) -> Turn:
 
 
 def _breathing(seconds: float) -> Iterator[Gesture]:
-    """Never quite still: whole breaths in the act's time, so that it loops."""
+    """Breathing: whole breaths in the duration of the motion, so that it loops."""
     always = {"begin": -10.0 * seconds, "end": 10.0 * seconds}
     breath = {**always, "frequency": max(1, round(0.3 * seconds)) / seconds}
     yield Gesture("SpineMid", (-0.016, 0.0, 0.0), **breath)
@@ -192,39 +192,38 @@ def _breathing(seconds: float) -> Iterator[Gesture]:
     yield from _both("Elbow", (0.0, 0.0, 0.03), **breath, phase=-0.9)
 
 
-def _strung(acts: tuple[BuiltinMotion, ...], overlap: float) -> BuiltinMotion:
-    """One act after the other, each starting `overlap` [s] before the last is quite at rest."""
+def _joined(motions: tuple[BuiltinMotion, ...], overlap: float) -> BuiltinMotion:
+    """The motions in sequence; each starts `overlap` [s] before the previous one ends."""
     gestures: list[Gesture] = []
     start = 0.0
-    for act in acts:
+    for motion in motions:
         gestures += [
             replace(gesture, begin=gesture.begin + start, end=gesture.end + start)
-            for gesture in act.gestures
+            for gesture in motion.gestures
         ]
-        start += act.seconds - overlap
+        start += motion.seconds - overlap
     return BuiltinMotion(start + overlap, tuple(gestures))
 
 
-def _acts() -> dict[str, BuiltinMotion]:
+def _motions() -> dict[str, BuiltinMotion]:
     arms, walk, wave, fingers, bow = _arms(), _walk(), _wave(), _fingers(), _bow()
-    show = _strung((wave, arms, walk, fingers, bow), overlap=0.4)
+    show = _joined((wave, arms, walk, fingers, bow), overlap=0.4)
     return {"show": show, "arms": arms, "walk": walk, "wave": wave, "fingers": fingers, "bow": bow}
 
 
-MOTIONS = tuple(_acts())
-"""Names of what the built-in performer can do; the first is all of it."""
+MOTIONS = tuple(_motions())
+"""Names of the built-in motions; the first joins all others."""
 
 
 @cache
 def motion_clip(name: str) -> MotionClip:
-    """One loop of the act called `name`.
+    """Return one loop of the motion called `name`.
 
     Raises:
-        InputError: there is none of that name; the message lists those there are.
+        InputError: no motion has that name; the message lists the known ones.
     """
     if name not in MOTIONS:
-        raise InputError(
-            f"no built-in performance is called {name!r}; there are: {', '.join(MOTIONS)}"
-        )
-    act = _acts()[name]
-    return sample_motion(replace(act, gestures=(*act.gestures, *_breathing(act.seconds))))
+        raise InputError(f"no built-in motion is called {name!r}; known: {', '.join(MOTIONS)}")
+    motion = _motions()[name]
+    gestures = (*motion.gestures, *_breathing(motion.seconds))
+    return sample_motion(replace(motion, gestures=gestures))

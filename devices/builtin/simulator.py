@@ -1,6 +1,6 @@
-"""Performers who are always there: ``sim://show``, ``sim://wave`` and so on, looping for ever.
+"""Device ``sim://show``, ``sim://wave`` and so on: built-in motions that loop without end.
 
-Option: ``performers=N``, who stand side by side, each a second behind the one before.
+Option: ``performers=N``; they stand side by side, each one second behind the previous.
 """
 
 from __future__ import annotations
@@ -18,28 +18,28 @@ from devices.builtin.motions import MOTIONS, motion_clip
 from devices.skeleton import Skeleton, SkeletonFrame
 
 BACKLOG_SECONDS = 1.0
-"""What lies further back than this when a poll comes is not given any more."""
+"""Frames that are older than this at a poll are skipped."""
 MOST_PERFORMERS = 64
 _APART = 1.2  # [m] between one performer and the next
 
 
 class Simulator:
-    """A live source of motion without a sensor: 60 frames a second on the host's clock.
+    """A live source of motion without a sensor: 60 frames per second on the host's clock.
 
     Args:
-        performance: what is played, again and again.
-        performers: how many play it.
-        clock: host monotonic time [s]; the performance begins with the first poll.
+        clip: the frames to repeat.
+        performers: number of performers.
+        clock: host monotonic time [s]; the motion begins with the first poll.
     """
 
     def __init__(
         self,
-        performance: MotionClip,
+        clip: MotionClip,
         clock: Callable[[], float] = time.perf_counter,
         *,
         performers: int = 1,
     ) -> None:
-        self._performance = performance
+        self._clip = clip
         self._performers = range(performers)
         self._clock = clock
         self._start: float | None = None
@@ -48,8 +48,8 @@ class Simulator:
 
     @property
     def skeleton(self) -> Skeleton:
-        """The puppet body, the same for every performance."""
-        return self._performance.skeleton
+        """The built-in skeleton, the same for every motion."""
+        return self._clip.skeleton
 
     @property
     def ended(self) -> bool:
@@ -57,13 +57,13 @@ class Simulator:
         return self._closed
 
     def poll(self) -> Sequence[SkeletonFrame]:
-        """Every frame that is due by now, oldest first, at most those of the last second."""
+        """Return every frame that is due, oldest first, at most those of the last second."""
         if self._closed:
             return []
         now = self._clock()
         if self._start is None:
             self._start = now
-        # A hair of a frame, so that a clock that ticks in frames is not one short by rounding.
+        # The margin keeps a clock that ticks in frames from losing one by rounding.
         due = int((now - self._start) * RATE + 1e-6) + 1
         first = max(self._next, due - int(BACKLOG_SECONDS * RATE))
         self._next = max(self._next, due)
@@ -74,19 +74,19 @@ class Simulator:
         ]
 
     def _frame(self, number: int, performer: int, start: float, now: float) -> SkeletonFrame:
-        index = (number - performer * int(RATE)) % len(self._performance.times)
+        index = (number - performer * int(RATE)) % len(self._clip.times)
         aside = np.array([_APART * ((performer + 1) // 2) * (-1) ** performer, 0.0, 0.0])
         return SkeletonFrame(
             time=start + number / RATE,
-            positions=self._performance.positions[index] + aside,
-            rotations=self._performance.rotations[index],
+            positions=self._clip.positions[index] + aside,
+            rotations=self._clip.rotations[index],
             confidence=np.ones(len(self.skeleton.names)),
             performer=performer,
             arrival=now,
         )
 
     def close(self) -> None:
-        """Let the performer go."""
+        """End the stream."""
         self._closed = True
 
     def __enter__(self) -> Self:
@@ -97,12 +97,12 @@ class Simulator:
 
 
 def open_device(address: SplitResult) -> Simulator:
-    """Open ``sim://ACT``; the first act where none is named."""
-    options = options_of(address, {"performers": _company})
+    """Open ``sim://MOTION``; without a name, the first motion."""
+    options = options_of(address, {"performers": _performer_count})
     return Simulator(motion_clip(address.netloc or MOTIONS[0]), **options)
 
 
-def _company(text: str) -> int:
+def _performer_count(text: str) -> int:
     if not (text.isascii() and text.isdigit() and 1 <= int(text[:9]) <= MOST_PERFORMERS):
         raise ValueError(f"expected a whole number from 1 to {MOST_PERFORMERS}")
     return int(text)

@@ -1,1 +1,1 @@
-"""Kinect v1, v2 and Azure, by their makers' libraries: `kinect://`."""
+"""Kinect v1, v2 and Azure through their makers' libraries: `kinect://`."""

@@ -1,11 +1,11 @@
-"""Azure Kinect and Orbbec Femto: the C interfaces of k4a and k4abt.
+"""Azure Kinect and Orbbec Femto through the C interfaces of k4a and k4abt.
 
 Orbbec's K4A wrapper has the same functions, so the same code opens a Femto Bolt or Mega. One thread
-takes captures from the camera and keeps the newest only; another gives one capture to the body
-tracker at a time and waits for its result. So no queue builds up: a tracker that is slower than the
-camera costs frames, not latency.
+takes captures from the camera and keeps only the newest; another gives one capture at a time to the
+body tracker and waits for its result. No queue builds up: a tracker that is slower than the camera
+reduces the frame rate, not the latency.
 Source: Azure Kinect Sensor SDK 1.4, k4a.h, k4atypes.h; Body Tracking SDK 1.1, k4abt.h,
-k4abttypes.h; Azure-Kinect-Samples, floor_detector_sample. Millimetres, +Y down, device
+k4abttypes.h; Azure-Kinect-Samples, floor_detector_sample. Millimetres, +Y down, device time in
 microseconds.
 """
 
@@ -38,26 +38,26 @@ TRACKER_LIBRARIES = (
     "libk4abt.so",
 )
 MISSING = (
-    "cannot open kinect://azure: {} is not here; install the Azure Kinect Sensor SDK 1.4 (or "
+    "cannot open kinect://azure: {} is missing; install the Azure Kinect Sensor SDK 1.4 (or "
     "Orbbec's K4A wrapper) and the Body Tracking SDK 1.1 (or run `bunraku bridge` where they are)"
 )
 PROCESSING = {"gpu": 0, "cpu": 1, "cuda": 2, "tensorrt": 3, "directml": 4}
 DEPTH_MODES = {"nfov": (2, 2), "nfov-binned": (1, 2), "wfov": (4, 1), "wfov-binned": (3, 2)}
-"""Depth mode, and the highest frame rate that it has: of k4a_fps_t 2 is 30, 1 is 15 a second."""
+"""Depth mode and its highest frame rate, as values of k4a_fps_t: 2 is 30, 1 is 15 per second."""
 
 JOINTS = 32
 MOST_BODIES = 16
 INVALID_ID = 0xFFFFFFFF
 WAIT_MS = 100
-SILENT_WAITS = 30  # of WAIT_MS without a capture after which the camera is lost
+SILENT_WAITS = 30  # waits of WAIT_MS without a capture, after which the camera counts as lost
 CONFIDENCE_OF_LEVEL = np.array([0.0, 0.5, 1.0, 1.0])
-"""None, low (predicted), medium (the most that this SDK gives), high (never seen)."""
+"""None, low (predicted), medium (the highest that this SDK gives), high (never observed)."""
 
 _TIMEOUT = 2  # K4A_WAIT_RESULT_TIMEOUT
-_CALIBRATION_BYTES = 4096  # more than k4a_calibration_t has; it is only handed on
+_CALIBRATION_BYTES = 4096  # more than the size of k4a_calibration_t, which is only passed on
 _DEPTH, _ACCELERATION = 0, 3  # k4a_calibration_type_t
 _GRAVITY = 9.81
-_AT_REST = 0.4  # [m/s^2] off gravity that is still a camera at rest
+_AT_REST = 0.4  # [m/s^2] largest deviation from gravity of a camera at rest
 _SAMPLES = 32
 
 
@@ -78,10 +78,10 @@ class AzureBody(ctypes.Structure):
 
 
 class Header(ctypes.Structure):
-    """What goes before the bodies from the library to the decoder.
+    """The data before the bodies in the packet from the library to the decoder.
 
-    The device's time [us], how many bodies follow, and which way is up in the depth camera's axes
-    (zero where the accelerometer did not say).
+    The device time [us], the number of bodies, and the up direction in the depth camera's axes
+    (zero if the accelerometer gave none).
     """
 
     _fields_ = (
@@ -131,10 +131,10 @@ class ImuSample(ctypes.Structure):
 
 
 def read_sensor_frame(data: bytes) -> SensorFrame:
-    """What the bytes of a `Header` and its bodies show.
+    """Decode the bytes of a `Header` and its bodies.
 
     Raises:
-        ValueError: they are of another length than the header says.
+        ValueError: the length differs from what the header states.
     """
     if len(data) < ctypes.sizeof(Header):
         raise ValueError(f"expected at least {ctypes.sizeof(Header)} bytes, got {len(data)}")
@@ -166,9 +166,9 @@ SENSOR = Sensor(KINECT_AZURE, AZURE_TO_WORLD, ("FootLeft", "FootRight"), read_se
 
 @dataclass(frozen=True, slots=True)
 class Setup:
-    """How the camera and the tracker run; the fields are those of the address's options.
+    """Settings of camera and tracker; the fields are the options of the address.
 
-    `model` is the file of the tracker's network; where it is empty the tracker looks for it.
+    `model` is the file of the tracker's network; if it is empty, the tracker searches for it.
     """
 
     device: int = 0
@@ -184,10 +184,10 @@ class KinectAzure:
     Args:
         camera: libk4a.
         tracker: libk4abt.
-        setup: how they run.
+        setup: settings of both.
 
     Raises:
-        InputError: the camera cannot be opened, or the tracker cannot be made.
+        InputError: the camera cannot be opened, or the tracker cannot be created.
     """
 
     def __init__(
@@ -200,8 +200,8 @@ class KinectAzure:
         self._calibration = ctypes.create_string_buffer(_CALIBRATION_BYTES)
         self._closing = threading.Event()
         self._fresh = threading.Condition()
-        self._newest: ctypes.c_void_p | None = None  # the capture that waits for the tracker
-        self._busy = False  # whether the tracker has a capture
+        self._newest: ctypes.c_void_p | None = None  # capture that waits for the tracker
+        self._busy = False  # whether the tracker is processing a capture
         self._lost = ""
         self._captures = threading.Thread(target=self._capture, name="k4a", daemon=True)
         try:
@@ -217,7 +217,7 @@ class KinectAzure:
         where = f"cannot open kinect://azure: camera {setup.device}"
         depth, rate = DEPTH_MODES[setup.depth]
         if self._k4a.k4a_device_open(setup.device, ctypes.byref(self._device)):
-            raise InputError(f"{where} does not answer; plug it in to USB 3, with enough power")
+            raise InputError(f"{where} does not answer; plug it in to USB 3 with enough power")
         configuration = DeviceConfiguration(depth_mode=depth, camera_fps=rate)
         if self._k4a.k4a_device_start_cameras(self._device, ctypes.byref(configuration)):
             raise InputError(f"{where} does not start; close other programs that use it")
@@ -230,16 +230,16 @@ class KinectAzure:
             self._calibration, tracker, ctypes.byref(self._tracker)
         ):
             raise InputError(
-                f"{where}: no body tracker on {setup.processing}; try ?processing=cpu, or name "
+                f"{where}: no body tracker on {setup.processing}; try ?processing=cpu, or give "
                 "the tracker's network: ?model=dnn_model_2_0_op11.onnx"
             )
         self._k4abt.k4abt_tracker_set_temporal_smoothing(self._tracker, setup.smoothing)
 
     def _measure_up(self) -> NDArray[np.float64]:
-        """(3,) which way is up in the depth camera's axes; zero if the camera does not say.
+        """The up direction (3,) in the depth camera's axes; zero if the camera gives none.
 
-        An accelerometer at rest measures gravity's reaction, straight up. A direction is turned by
-        moving two points that lie along it.
+        An accelerometer at rest measures the reaction to gravity, which points up. A direction is
+        converted by converting two points on it.
         """
         sample, readings = ImuSample(), []
         if self._k4a.k4a_device_start_imu(self._device):
@@ -263,7 +263,7 @@ class KinectAzure:
         return None if failed else np.array(target, dtype=np.float64)
 
     def _capture(self) -> None:
-        """Take every capture as it comes, on a thread of its own; the newest waits."""
+        """Take captures on a thread of its own; the newest waits for the tracker."""
         silent = 0
         while not self._closing.is_set():
             capture = ctypes.c_void_p()
@@ -274,7 +274,7 @@ class KinectAzure:
                     self._drop_newest()
                     self._newest = capture
                 elif result != _TIMEOUT or silent > SILENT_WAITS:
-                    self._lost = "the camera answers no more; plug it in again"
+                    self._lost = "the camera no longer answers; plug it in again"
                 self._fresh.notify()
                 if self._lost:
                     return
@@ -285,7 +285,7 @@ class KinectAzure:
             self._newest = None
 
     def _feed_tracker(self) -> None:
-        """Give the tracker, if it has nothing to do, the newest capture."""
+        """Give the newest capture to the tracker if it is idle."""
         with self._fresh:
             if not self._busy and self._newest is None:
                 self._fresh.wait(WAIT_MS * 1e-3)
@@ -299,7 +299,7 @@ class KinectAzure:
             self._drop_newest()
 
     def read(self) -> bytes | None:
-        """The bytes of the tracker's next result, or None when none came in time."""
+        """Return the bytes of the tracker's next result, or None if none came in time."""
         self._feed_tracker()
         if not self._busy:
             return None
@@ -309,7 +309,7 @@ class KinectAzure:
             return None
         self._busy = False
         if result:
-            raise SensorLostError("the body tracker stopped; see that its graphics driver works")
+            raise SensorLostError("the body tracker stopped; check its graphics driver")
         try:
             return self._bytes_of(frame)
         finally:
@@ -330,7 +330,7 @@ class KinectAzure:
         return bytes(header) + b"".join(bodies)
 
     def close(self) -> None:
-        """Stop the camera and give both back."""
+        """Stop the camera and release camera and tracker."""
         self._closing.set()
         if self._captures.ident is not None:
             self._captures.join()
@@ -349,7 +349,7 @@ class KinectAzure:
 
 
 def _declare(camera: Any, tracker: Any) -> None:
-    """Say what the functions take and give; without it ctypes would cut handles to 32 bits."""
+    """Declare argument and result types; without them ctypes would cut handles to 32 bits."""
     handle, number, out = ctypes.c_void_p, ctypes.c_uint32, ctypes.c_void_p
     for library, name, result, takes in (
         (camera, "k4a_device_open", number, [number, out]),

@@ -1,9 +1,9 @@
-"""Bodies as a depth camera reports them, made into frames: what all Kinects have in common.
+"""Convert the bodies that a Kinect reports to frames: code common to all Kinect versions.
 
-Camera axes become ours as `devices.kinect.joints` says; the floor is y = 0 and upright by
-`devices.bodies.camera_level`, and the camera stands above the origin. Orientations keep the local
-axes that the SDK gives a joint and are turned into the world; an SDK's all-zero quaternion means
-that there is none.
+Camera axes become ours as in `devices.kinect.joints`. `devices.bodies.camera_level` brings the
+floor to y = 0 and level; the camera stands above the origin. Orientations keep the local axes that
+the SDK gives a joint and are turned into the world; an all-zero quaternion means that there is
+none.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from devices.transport.clock_map import ClockMap
 
 Array = NDArray[np.float64]
 
-FURTHEST = 100.0  # [m] no depth camera sees so far
-_SURE = 0.75  # confidence from which a foot says where the floor is
+FURTHEST = 100.0  # [m] beyond the range of every depth camera
+_SURE = 0.75  # confidence from which a foot indicates the floor
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,10 +31,10 @@ class SensorBody:
     """One person in one frame.
 
     Attributes:
-        id: the sensor's own number for the person.
-        positions: (J, 3) [m] camera axes.
-        rotations: (J, 4) joint to camera, (x, y, z, w); all zero where there is none.
-        confidence: (J,) in [0, 1]; 0 where the position says nothing.
+        id: the sensor's own number of the person.
+        positions: (J, 3) [m] in camera axes.
+        rotations: (J, 4) joint to camera, (x, y, z, w); all zero if there is none.
+        confidence: (J,) in [0, 1]; 0 where the position is invalid.
     """
 
     id: int
@@ -45,13 +45,13 @@ class SensorBody:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SensorFrame:
-    """What a sensor saw at one moment.
+    """The bodies and the floor that a sensor saw at one moment.
 
     Attributes:
-        time: [s] of the sensor's clock.
-        bodies: everyone who is tracked.
-        up: (3,) the floor's normal in camera axes; all zero where it is not known.
-        height: [m] of the camera above the floor; NaN where it is not known.
+        time: [s] on the sensor's clock.
+        bodies: all tracked people.
+        up: (3,) the floor's normal in camera axes; all zero if unknown.
+        height: [m] of the camera above the floor; NaN if unknown.
     """
 
     time: float
@@ -62,7 +62,7 @@ class SensorFrame:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sensor:
-    """A kind of Kinect.
+    """A Kinect version.
 
     Attributes:
         skeleton: its joints.
@@ -78,14 +78,14 @@ class Sensor:
 
 
 class KinectDecoder:
-    """Frames of everyone whom a sensor sees, from the bytes of its SDK's frames.
+    """Frames of all people that a sensor sees, from the bytes of its SDK's frames.
 
     Args:
-        sensor: which kind it is.
-        level: whether the floor is found and made y = 0; else the camera is the origin.
+        sensor: the Kinect version.
+        level: whether the floor is found and brought to y = 0; else the camera is the origin.
 
     Attributes:
-        refused: how many frames of bytes were none.
+        refused: packets that could not be decoded.
     """
 
     def __init__(self, sensor: Sensor, *, level: bool = True) -> None:
@@ -102,9 +102,9 @@ class KinectDecoder:
         """The sensor's joints."""
         return self._sensor.skeleton
 
-    @np.errstate(over="ignore", invalid="ignore")  # whatever a damaged packet holds
+    @np.errstate(over="ignore", invalid="ignore")  # values of a damaged packet
     def feed(self, data: bytes, arrival: float) -> Sequence[SkeletonFrame]:
-        """A frame of each person in the SDK's frame `data` that came at `arrival` [s]."""
+        """Return a frame of each person in the SDK frame `data`, received at `arrival` [s]."""
         try:
             sensor_frame = self._sensor.read(data)
         except ValueError:
@@ -142,14 +142,14 @@ class KinectDecoder:
 
 
 def _middle(body: SensorBody) -> Array:
-    """(3,) [m] the mean of the joints that are seen; NaN where none is."""
+    """(3,) [m] mean of the visible joints; NaN if there are none."""
     seen = body.positions[body.confidence > 0.0]
     return np.mean(seen, axis=0) if len(seen) else np.full(3, np.nan)
 
 
 def _in_world(body: SensorBody, to_world: Array) -> SensorBody:
-    """The body with its places, not yet its turns, in our axes; NaN and confidence 0 where nothing
-    can be there."""
+    """The body with positions in our axes; NaN and confidence 0 where a position is invalid. Its
+    rotations still refer to the camera."""
     near = (np.abs(body.positions) < FURTHEST).all(axis=1)  # False for NaN
     seen = near & (body.confidence > 0.0) & (body.positions != 0.0).any(axis=1)
     positions = np.full_like(body.positions, np.nan)
@@ -162,7 +162,7 @@ def _in_world(body: SensorBody, to_world: Array) -> SensorBody:
 
 
 def _turned(rotations: Array, turn: Array) -> Array:
-    """Rotations (J, 4) with `turn` (3, 3) after them; NaN where one is no rotation."""
+    """Rotations (J, 4) followed by `turn` (3, 3); NaN where a quaternion is no rotation."""
     length = np.linalg.norm(rotations, axis=1)
     known = (length > 0.5) & (length < 2.0)  # False for NaN
     out = np.full_like(rotations, np.nan)

@@ -1,8 +1,8 @@
 """The joints of the three Kinects: names and order of each SDK, parents, and a rest pose.
 
 Source: Kinect for Windows SDK 1.8 (NUI_SKELETON_POSITION_INDEX), SDK 2.0 (JointType), Azure Kinect
-Body Tracking SDK 1.1 (k4abt_joint_id_t). The rest pose is a standing body 1.75 m tall, arms hanging
-a little away from it, metres, +Y up, facing +Z, left on +X.
+Body Tracking SDK 1.1 (k4abt_joint_id_t). The rest pose is a standing body 1.75 m tall whose arms
+hang a little away from it; metres, +Y up, facing +Z, left on +X.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 
 from devices.skeleton import Skeleton
 
-# Of each joint: its name, its parent, and where it stands at rest.
+# Of each joint: its name, its parent, and its position at rest [m].
 _Joints = tuple[tuple[str, str, float, float, float], ...]
 
 _V1: _Joints = (
@@ -111,8 +111,9 @@ KINECT_V1 = _skeleton(_V1)
 KINECT_V2 = _skeleton(_V2)
 KINECT_AZURE = _skeleton(_AZURE)
 
-# Camera axes to ours, the performer facing the sensor: Kinect v1 and v2 have +X to the sensor's
-# left, +Y up and +Z away from it (half a turn about Y); Azure has +Y down (half a turn about X).
+# Camera axes to ours, with the performer facing the sensor. Kinect v1 and v2 have +X to the
+# sensor's left, +Y up and +Z away from it (half a turn about Y); Azure has +Y down (half a turn
+# about X).
 KINECT_TO_WORLD = np.diag([-1.0, 1.0, -1.0])
 AZURE_TO_WORLD = np.diag([1.0, -1.0, -1.0])
 

@@ -1,8 +1,7 @@
-"""Kinects, one scheme for all: ``kinect://v1``, ``kinect://v2`` and ``kinect://azure``.
+"""Device ``kinect://v1``, ``kinect://v2`` and ``kinect://azure``.
 
 Each needs its maker's library on this machine; Azure's also opens Orbbec's Femto cameras. The
-sensor's own floor, or accelerometer, levels what it sees; ``?floor=camera`` leaves it as the camera
-sees it.
+sensor's floor plane or accelerometer levels the frames; ``?floor=camera`` keeps camera axes.
 """
 
 from __future__ import annotations
@@ -34,13 +33,13 @@ def open_device(address: SplitResult) -> LiveStream:
     """Open ``kinect://v1?seated=on``, ``kinect://v2`` or ``kinect://azure?processing=cpu``.
 
     Raises:
-        InputError: there is no such Kinect, an option is not known, the library is not installed,
-            or no sensor answers.
+        InputError: there is no such Kinect, an option is unknown, the library is not installed, or
+            no sensor answers.
     """
     kind = address.netloc
     if kind not in KINDS or address.path.strip("/"):
         known = ", ".join(f"kinect://{one}" for one in KINDS)
-        raise InputError(f"cannot open {address.geturl()!r}: no such Kinect; there are: {known}")
+        raise InputError(f"cannot open {address.geturl()!r}: no such Kinect; known: {known}")
     sensor, known_options, open_sensor = KINDS[kind]
     options = options_of(address, FLOOR | known_options)
     level = options.pop("floor", "level") == "level"
@@ -72,7 +71,7 @@ def _share(text: str) -> float:
 
 def _file(text: str) -> str:
     if not Path(text).is_file():
-        raise ValueError("there is no such file")
+        raise ValueError("expected an existing file")
     return text
 
 

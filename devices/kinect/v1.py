@@ -1,7 +1,7 @@
-"""Kinect for Xbox 360 and for Windows, version 1: the flat C interface of Kinect10.dll.
+"""Kinect for Xbox 360 and Kinect for Windows v1 through the C interface of Kinect10.dll.
 
-Source: Kinect for Windows SDK 1.8, NuiApi.h, NuiSensor.h, NuiSkeleton.h. Metres in camera space;
-of six people two are tracked, of the others only the place is known, and they are left out.
+Source: Kinect for Windows SDK 1.8, NuiApi.h, NuiSensor.h, NuiSkeleton.h. Metres in camera space. Of
+six people two are tracked; of the others only the position is known, and they are omitted.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from devices.transport.sdk_library import SensorLostError
 
 LIBRARIES = ("Kinect10.dll",)
 MISSING = (
-    "cannot open kinect://v1: Kinect10.dll is not here; it needs Windows with the Kinect for "
+    "cannot open kinect://v1: Kinect10.dll is missing; it needs Windows with the Kinect for "
     "Windows Runtime 1.8 (or run `bunraku bridge` where the Kinect is plugged in)"
 )
 USES_SKELETON = 0x8
@@ -83,7 +83,7 @@ class BoneOrientation(ctypes.Structure):
 
 
 class Packet(ctypes.Structure):
-    """What goes from the library to the decoder: a frame, and the bones of everyone in it."""
+    """The packet from the library to the decoder: a frame, and the bones of all people in it."""
 
     _fields_ = (
         ("frame", NuiSkeletonFrame),
@@ -95,10 +95,10 @@ _PACKET = np.dtype(Packet)
 
 
 def read_sensor_frame(data: bytes) -> SensorFrame:
-    """What the bytes of a `Packet` show.
+    """Decode the bytes of a `Packet`.
 
     Raises:
-        ValueError: they are of another length.
+        ValueError: the length is wrong.
     """
     if len(data) != ctypes.sizeof(Packet):
         raise ValueError(f"expected {ctypes.sizeof(Packet)} bytes, got {len(data)}")
@@ -164,13 +164,13 @@ class KinectV1:
             )
 
     def read(self) -> bytes | None:
-        """The bytes of the next `Packet`, or None when none came in time."""
+        """Return the bytes of the next `Packet`, or None if none came in time."""
         frame = self._packet.frame
         code = self._nui.NuiSkeletonGetNextFrame(ctypes.c_uint32(WAIT_MS), ctypes.byref(frame))
         if code == NO_DATA:
             return None
         if code:
-            raise SensorLostError(f"the Kinect answers no more (0x{code:08X}); is it plugged in?")
+            raise SensorLostError(f"the Kinect no longer answers (0x{code:08X}); plug it in again")
         for person, bones in zip(frame.people, self._packet.bones, strict=True):
             failed = person.tracking_state != _TRACKED or (
                 self._nui.NuiSkeletonCalculateBoneOrientations(
@@ -182,5 +182,5 @@ class KinectV1:
         return bytes(self._packet)
 
     def close(self) -> None:
-        """Give the sensor back."""
+        """Release the sensor."""
         self._nui.NuiShutdown()

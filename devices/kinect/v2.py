@@ -1,7 +1,7 @@
-"""Kinect for Xbox One: the COM interfaces of Kinect20.dll, called through their tables.
+"""Kinect for Xbox One through the COM interfaces of Kinect20.dll, called by their method tables.
 
-The SDK's one flat function gives an `IKinectSensor`; the few methods that are needed of it and of
-what it opens are called by their place in the interface's table, so that no COM library is needed.
+The SDK's only plain function returns an `IKinectSensor`. Its methods, and those of the objects that
+it opens, are called by their index in the interface's table, so no COM library is needed.
 Source: Kinect for Windows SDK 2.0, Kinect.h. Metres in camera space; six slots for bodies, which
 are not identities; the orientation of a joint is that of the bone that ends there.
 """
@@ -23,18 +23,18 @@ from devices.transport.sdk_library import SensorLostError
 
 LIBRARIES = ("Kinect20.dll",)
 MISSING = (
-    "cannot open kinect://v2: Kinect20.dll is not here; it needs Windows with the Kinect for "
+    "cannot open kinect://v2: Kinect20.dll is missing; it needs Windows with the Kinect for "
     "Windows Runtime 2.0 (or run `bunraku bridge` where the Kinect is plugged in)"
 )
 PEOPLE = 6
 JOINTS = 25
 PENDING = 0x8000000A  # E_PENDING: no new frame yet
 WAIT = 0.1  # [s]
-PAUSE = 0.002  # [s] between two looks for a new frame
-ASLEEP = 5.0  # [s] without a frame or a sensor after which it is opened again
+PAUSE = 0.002  # [s] between two checks for a new frame
+ASLEEP = 5.0  # [s] without a frame or a sensor, after which it is opened again
 _TICK = 1e-7
 
-# Places of methods in their interface's table; the first three are IUnknown's.
+# Indices of methods in their interface's table; the first three are IUnknown's.
 _RELEASE = 2
 _SENSOR_OPEN, _SENSOR_CLOSE, _SENSOR_IS_AVAILABLE, _SENSOR_BODY_FRAME_SOURCE = 6, 7, 9, 12
 _SOURCE_OPEN_READER = 8
@@ -60,7 +60,7 @@ class JointOrientation(ctypes.Structure):
 
 
 class TrackedBody(ctypes.Structure):
-    """One of the six slots, as it goes from the library to the decoder."""
+    """One of the six slots, in the packet from the library to the decoder."""
 
     _fields_ = (
         ("id", ctypes.c_uint64),
@@ -71,7 +71,7 @@ class TrackedBody(ctypes.Structure):
 
 
 class Packet(ctypes.Structure):
-    """What goes from the library to the decoder: time [100 ns], floor plane and bodies."""
+    """The packet from the library to the decoder: time [100 ns], floor plane and bodies."""
 
     _fields_ = (
         ("time", ctypes.c_int64),
@@ -84,10 +84,10 @@ _PACKET = np.dtype(Packet)
 
 
 def read_sensor_frame(data: bytes) -> SensorFrame:
-    """What the bytes of a `Packet` show.
+    """Decode the bytes of a `Packet`.
 
     Raises:
-        ValueError: they are of another length.
+        ValueError: the length is wrong.
     """
     if len(data) != ctypes.sizeof(Packet):
         raise ValueError(f"expected {ctypes.sizeof(Packet)} bytes, got {len(data)}")
@@ -123,7 +123,7 @@ SENSOR = Sensor(KINECT_V2, KINECT_TO_WORLD, ("FootLeft", "FootRight"), read_sens
 
 
 def _method(thing: ctypes.c_void_p, place: int, *types: type) -> Callable[..., int]:
-    """The method at `place` in the table of a COM object; it gives an unsigned HRESULT."""
+    """The method at index `place` in the table of a COM object; it returns an unsigned HRESULT."""
     kind: Any = getattr(ctypes, "WINFUNCTYPE", ctypes.CFUNCTYPE)
     table = ctypes.cast(thing, ctypes.POINTER(ctypes.POINTER(ctypes.c_void_p)))[0]
     function = kind(ctypes.c_uint32, ctypes.c_void_p, *types)(table[place])
@@ -175,7 +175,7 @@ class KinectV2:
         return code
 
     def read(self) -> bytes | None:
-        """The bytes of the newest `Packet`, or None when none came in time."""
+        """Return the bytes of the newest `Packet`, or None if none came in time."""
         frame = ctypes.c_void_p()
         latest = _method(self._reader, _READER_ACQUIRE_LATEST_FRAME, ctypes.c_void_p)
         until = time.perf_counter() + WAIT
@@ -185,7 +185,7 @@ class KinectV2:
                 return None
             time.sleep(PAUSE)
         if code:
-            raise SensorLostError(f"the Kinect answers no more (0x{code:08X}); is it plugged in?")
+            raise SensorLostError(f"the Kinect no longer answers (0x{code:08X}); plug it in again")
         self._last = time.perf_counter()
         try:
             return bytes(self._packet(frame))
@@ -198,7 +198,7 @@ class KinectV2:
         if available.value:
             self._last = time.perf_counter()
         elif time.perf_counter() - self._last > ASLEEP:
-            raise SensorLostError("the Kinect is not there; plug it in to USB 3, and power it")
+            raise SensorLostError("the Kinect is absent; plug it in to USB 3, with its power")
 
     def _packet(self, frame: ctypes.c_void_p) -> Packet:
         packet = Packet()
@@ -214,7 +214,7 @@ class KinectV2:
         return packet
 
     def close(self) -> None:
-        """Give the sensor back."""
+        """Release the sensor."""
         for body in self._bodies:
             _release(ctypes.c_void_p(body))
         self._bodies = (ctypes.c_void_p * PEOPLE)()
@@ -227,7 +227,7 @@ class KinectV2:
 
 
 def _fill(body: ctypes.c_void_p, slot: TrackedBody) -> None:
-    """Copy an IBody into a slot; what it fails to give leaves the slot untracked."""
+    """Copy an IBody into a slot; if a call fails, the slot stays untracked."""
     tracked = ctypes.c_ubyte()
     _method(body, _BODY_IS_TRACKED, ctypes.c_void_p)(ctypes.addressof(tracked))
     if not tracked.value:

@@ -1,8 +1,8 @@
-"""The hands in one message of the Leap Motion's WebSocket protocol, live or recorded.
+"""Decode the hands in one JSON message of the Leap Motion's WebSocket protocol, live or recorded.
 
-Protocol 6 gives every finger's bones and says which hand is which; protocols before it give palms
-and finger tips only. Fingers belong to a hand by its id, in any order. What is odd is not there:
-a number that is none, a vector that is not three of them, a finger without a hand.
+Protocol 6 gives the bones of every finger and the side of each hand; earlier protocols give only
+palms and finger tips. A finger refers to its hand by id, in any order. Invalid parts are omitted:
+values that are not numbers, vectors that are not three numbers, fingers without a hand.
 Source: leapjs, lib/frame.js, hand.js, finger.js; Leap developer archive, "JSON Frame".
 """
 
@@ -24,9 +24,9 @@ Array = NDArray[np.float64]
 FARTHEST_MM = 1e5
 _PLACES = {"elbow": "elbow", "wrist": "wrist", PALM: "palmPosition"}
 # The bone that starts at a joint, of the four of a finger: metacarpal, proximal, intermediate,
-# distal. The tip, where none starts, keeps the turn of the last.
+# distal. No bone starts at the tip, which keeps the rotation of the last one.
 _BONE_FROM = {"mcp": 1, "pip": 2, "dip": 3, "tip": 3}
-# Of each finger: its joints, the name of each in a message, and the bone that starts there.
+# Of each finger: its joints, their keys in a message, and the bones that start there.
 _ENDS = [
     [
         (name, f"{name.removeprefix(finger + '_')}Position", _BONE_FROM[name.rpartition("_")[2]])
@@ -35,7 +35,7 @@ _ENDS = [
     ]
     for finger in FINGERS
 ]
-_SQUARE = 0.05  # how far a basis may be from orthonormal and still be one
+_SQUARE = 0.05  # largest deviation of a basis from orthonormal
 
 
 @dataclass(slots=True)
@@ -43,17 +43,17 @@ class Hand:
     """One hand of one message.
 
     Attributes:
-        id: the device's number for it; another one after the hand was lost.
-        side: "left", "right", or None where the device does not say.
+        id: the device's number of the hand; it changes when the hand is lost.
+        side: "left", "right", or None if the device does not give it.
         confidence: in [0, 1].
         joints: (3,) [mm, device axes] by joint name.
-        direction: (3,) from the palm to the fingers, device axes; NaN where unknown.
-        normal: (3,) out of the palm, device axes; NaN where unknown.
+        direction: (3,) from the palm to the fingers, device axes; NaN if unknown.
+        normal: (3,) out of the palm, device axes; NaN if unknown.
         tips: finger tips that the message does not name.
-        bases: by joint name the axes (3, 3) of the bone that starts there, in device axes: the
-            columns are the axis it flexes about, up out of its back, and back along it. Of a left
-            hand, which the device measures with a left-handed basis, the first is turned round, so
-            that every basis is a rotation.
+        bases: by joint name the axes (3, 3) of the bone that starts there, in device axes. The
+            columns are the axis of flexion, the direction out of the bone's back, and the direction
+            backwards along it. The device gives a left hand a left-handed basis; its first column
+            is negated, so that every basis is a rotation.
     """
 
     id: int
@@ -68,7 +68,7 @@ class Hand:
 
 @dataclass(slots=True)
 class LeapFrame:
-    """One message: the device's time [us] or None, the rate it states, and its hands."""
+    """One message: the device's time [us] or None, its stated frame rate, and its hands."""
 
     timestamp: float | None
     rate: float | None
@@ -76,7 +76,7 @@ class LeapFrame:
 
 
 def leap_frame(message: Mapping[str, Any]) -> LeapFrame:
-    """The frame that a decoded message shows; hands without a palm are left out."""
+    """Return the frame in a decoded message; hands without a palm are omitted."""
     found = {hand.id: hand for hand in map(_found, _objects(message.get("hands")))}
     for pointable in _objects(message.get("pointables")):
         of = found.get(_whole(pointable.get("handId")))
@@ -91,14 +91,14 @@ def leap_frame(message: Mapping[str, Any]) -> LeapFrame:
 
 
 def palm_basis(direction: Array, normal: Array) -> Array:
-    """Axes (3, 3) of a palm: across it, up out of its back, back from the fingers; NaN where they
-    are not known."""
+    """Return the axes (3, 3) of a palm: across it, out of its back, back from the fingers; NaN if
+    unknown."""
     return np.stack([np.cross(normal, direction), -normal, -direction], axis=1)
 
 
 def rotations(bases: Array) -> tuple[Array, NDArray[np.bool_]]:
-    """Bases (n, 3, 3), their axes in columns, as rotations: where one is left-handed its first axis
-    is turned round. The second result (n,) says which are bases at all."""
+    """Convert bases (n, 3, 3), axes in columns, to rotations: a left-handed basis gets its first
+    axis negated. The second result (n,) marks the valid bases."""
     with np.errstate(over="ignore", invalid="ignore"):
         gram = np.swapaxes(bases, 1, 2) @ bases
         close = np.abs(gram - np.eye(3)) < _SQUARE
@@ -109,7 +109,7 @@ def rotations(bases: Array) -> tuple[Array, NDArray[np.bool_]]:
 
 
 def number(value: Any) -> float | None:
-    """A finite number, or None for anything else that JSON can hold."""
+    """Return a finite number, or None for any other JSON value."""
     if not isinstance(value, int | float) or isinstance(value, bool):
         return None
     found = float(value) if abs(value) < 1e300 else math.inf
@@ -118,7 +118,7 @@ def number(value: Any) -> float | None:
 
 @dataclass(slots=True)
 class _Found:
-    """A hand's vectors as JSON has them, by joint, until all of them are made arrays at once."""
+    """A hand's vectors as in the JSON, by joint, before all are converted to arrays at once."""
 
     hand: dict[str, Any]
     id: int
@@ -144,7 +144,7 @@ def _add_finger(found: _Found, pointable: Mapping[str, Any]) -> None:
             found.tips.append(Tip(_whole(pointable.get("id")), np.array(tip)))
         return
     kind = _whole(pointable.get("type"))
-    if kind < 0:  # the packed form leaves it out; ids are 10 * hand + finger
+    if kind < 0:  # the packed form omits it; ids are 10 * hand + finger
         kind = _whole(pointable.get("id")) % 10
     if kind >= len(FINGERS):
         return
@@ -197,7 +197,7 @@ def _objects(found: Any) -> list[dict[str, Any]]:
 
 
 def _vector(value: Any) -> tuple[float, float, float] | None:
-    """Three numbers within reach, or None."""
+    """Three numbers within range, or None."""
     if type(value) is not list or len(value) != 3:
         return None
     x, y, z = value

@@ -1,12 +1,12 @@
-"""The joints of hands as the Leap Motion sees them, and the way they are shown.
+"""The joints of Leap Motion hands, and the conversion of device coordinates to ours.
 
 A Leap lies on the desk and looks up: +X to the user's right, +Y up, +Z towards the user,
-millimetres from the middle of the device. Fingers over it point away from the user, between level
-and straight up. Our performer faces the camera at +Z with left at +X, so the hands are turned by
-180 degrees about Y; and then by 45 degrees about X, so that forward as well as up is up in the
-picture. A hand held level and one held upright are both seen with their palms and fingers at 0.7
-of their length, and the usual hand between the two in full; turned by 180 degrees alone, a level
-hand's fingers would point straight into the camera, where no motion of theirs can be seen.
+millimetres from the middle of the device. The fingers above it point away from the user, between
+level and straight up. Our performer faces the camera at +Z with left at +X, so the hands are turned
+by 180 degrees about Y. They are then turned by 45 degrees about X, so that both forward and up on
+the device are up in the picture. Palm and fingers of a level hand and of an upright one both appear
+at 0.7 of their length, and the usual pose between the two appears in full. Turned by 180 degrees
+only, the fingers of a level hand would point into the camera, where their motion is invisible.
 """
 
 from __future__ import annotations
@@ -29,15 +29,15 @@ _TILT = np.sqrt(0.5)
 LEAP_TO_WORLD = 1e-3 * np.array([[-1.0, 0.0, 0.0], [0.0, _TILT, -_TILT], [0.0, -_TILT, -_TILT]])
 LEAP_TO_WORLD.setflags(write=False)
 
-# Where two hands are joined: 25 cm towards the user from the middle of the space that the device
-# watches, about where a chest would be. It stands still, so that a hand that moves swings about it.
+# Root of two hands: 25 cm towards the user from the middle of the tracked space, about the place of
+# the chest. It does not move, so a moving hand swings about it.
 _CHEST_MM = (0.0, 200.0, 250.0)
 
 _NO_BONE = ("thumb", "mcp")
 
 # Parents of one hand. The near ends of the metacarpals (carpPosition; of the thumb, whose
-# metacarpal has no length in the device's model, mcpPosition) are left out: they lie behind the
-# palm's middle, and a chain through them would run back before it runs out to the finger.
+# metacarpal has no length in the device's model, mcpPosition) are omitted: they lie behind the
+# middle of the palm, and a chain through them would first run backwards.
 HAND_PARENTS: Mapping[str, str | None] = {
     "elbow": None,
     "wrist": "elbow",
@@ -50,7 +50,7 @@ HAND_PARENTS: Mapping[str, str | None] = {
     },
 }
 
-# A flat right hand, its palm towards the camera: degrees from straight up, towards the thumb.
+# A flat right hand with its palm to the camera: degrees from straight up, towards the thumb.
 _FAN = {"thumb": (60.0, 40.0), "index": (20.0, 8.0), "middle": (4.0, 1.0)}
 _FAN |= {"ring": (-12.0, -6.0), "pinky": (-28.0, -14.0)}
 _LENGTHS = {"mcp": 0.055, "pip": 0.042, "dip": 0.026, "tip": 0.022, "wrist": 0.25, PALM: 0.065}
@@ -58,12 +58,12 @@ _TIP_ONLY = 0.10
 
 
 def leap_to_world(millimetres: ArrayLike) -> Array:
-    """Leap positions (..., 3) [mm, device axes] as (..., 3) [m] as this project shows hands."""
+    """Convert Leap positions (..., 3) [mm, device axes] to our coordinates (..., 3) [m]."""
     return np.asarray(millimetres, dtype=np.float64) @ LEAP_TO_WORLD.T
 
 
 def chest() -> Array:
-    """(3,) [m] where the root of two hands stands."""
+    """Return the position (3,) [m] of the root of two hands."""
     return leap_to_world(_CHEST_MM)
 
 
@@ -74,17 +74,17 @@ def hand_skeleton(
     *,
     left: bool = False,
 ) -> Skeleton:
-    """The skeleton of one hand, or of two joined at a root that is in neither.
+    """Return the skeleton of one hand, or of two hands with a common root.
 
     Args:
-        joints: which of `HAND_PARENTS` there are; the palm always is. A joint's parent is its
-            nearest ancestor among them.
-        sides: empty for one hand, whose joints carry the bare names; else the sides whose names
-            go before the joints', "left_palm" and so on, under the root "hands".
-        lengths: [m] of the bone that ends at a joint, by its bare name; others have a grown-up's.
-        left: whether one hand alone is a left hand, and rests as one.
+        joints: the available joints of `HAND_PARENTS`; the palm is always included. The parent of a
+            joint is its nearest ancestor among them.
+        sides: empty for one hand, whose joints have bare names; else the sides that prefix the
+            names, "left_palm" and so on, under the root "hands".
+        lengths: [m] of the bone that ends at a joint, by its bare name; by default an adult's.
+        left: whether a single hand is a left hand.
 
-    Its rest pose is a flat hand, fingers up, palm towards the camera.
+    The rest pose is a flat hand, fingers up, palm to the camera.
     """
     present = [name for name in HAND_PARENTS if name in {*joints, PALM}]
     parents = {name: _ancestor(name, present) for name in present}
@@ -120,7 +120,7 @@ def _indices(names: list[str], parents: Mapping[str, str | None]) -> NDArray[np.
 
 
 def _rest_hand(parents: Mapping[str, str | None], lengths: Mapping[str, float]) -> dict[str, Array]:
-    """A flat right hand; the first joint at the origin."""
+    """The joints of a flat right hand; the first joint is at the origin."""
     places: dict[str, Array] = {}
     for name, parent in parents.items():
         if parent is None:

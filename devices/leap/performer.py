@@ -1,4 +1,4 @@
-"""Hands that a Leap Motion sees, message by message, as frames of one performer."""
+"""Combine the hands in Leap Motion messages to frames of one performer."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ from devices.skeleton import SkeletonFrame
 Array = NDArray[np.float64]
 
 BOTH = "both"
-SAME_HAND_MM = 150.0  # a hand that comes back nearer than this to where it was lost is the same
-INFERRED = 0.5  # how sure a joint is that is put where it is likely, as Kinects have it
+SAME_HAND_MM = 150.0  # a hand that returns within this distance of its last place is the same hand
+INFERRED = 0.5  # confidence factor of a joint with an assumed position, as for Kinects
 _ARM_MM = (("wrist", 65.0), ("elbow", 250.0))  # from the palm to the wrist, and on to the elbow
 _TURN = 1e3 * LEAP_TO_WORLD  # device axes to ours, without the unit
 
 
 class HandSides:
-    """Which hand is the left and which the right, from message to message.
+    """Assigns the sides left and right to hands, from message to message.
 
-    The device's own word comes first. Where it gives none, a hand keeps the side it has while it
-    keeps its id; one with a new id takes the side where a hand was lost near by, else the side
-    that is free, else the one it is on. Of two hands of one side the one that was there before is
-    taken, then the one nearest to where that side was last seen, then the surer.
+    The device's own side has priority. Otherwise a hand keeps its side while it keeps its id. A
+    hand with a new id takes the side of a hand that was lost nearby, else the free side, else the
+    side of the device that it is on. Of two hands of one side, the one that was present before is
+    taken, then the one nearest to the last place of that side, then the more confident one.
     """
 
     def __init__(self) -> None:
@@ -45,29 +45,29 @@ class HandSides:
         self._places: dict[str, Array] = {}
 
     def __call__(self, hands: Sequence[Hand]) -> dict[str, Hand]:
-        """The hands of one message by their side; at most one for each."""
-        held = {number: side for side, number in self._ids.items()}
+        """Return the hands of one message by side; at most one for each."""
+        known = {number: side for side, number in self._ids.items()}
         found: dict[str, Hand] = {}
-        for hand in sorted(hands, key=lambda hand: self._rank(hand, held)):
-            found.setdefault(hand.side or self._side(hand, held, found), hand)
+        for hand in sorted(hands, key=lambda hand: self._rank(hand, known)):
+            found.setdefault(hand.side or self._side(hand, known, found), hand)
         self._ids = {side: hand.id for side, hand in found.items()}
         self._places.update({side: hand.joints[PALM] for side, hand in found.items()})
         return found
 
-    def _rank(self, hand: Hand, held: dict[int, str]) -> tuple[bool, float, float]:
+    def _rank(self, hand: Hand, known: dict[int, str]) -> tuple[bool, float, float]:
         sides = [hand.side] if hand.side else SIDES
-        return hand.id not in held, min(self._far(hand, side) for side in sides), -hand.confidence
+        return hand.id not in known, min(self._far(hand, side) for side in sides), -hand.confidence
 
     def _far(self, hand: Hand, side: str) -> float:
-        """[mm] from where a side was last seen; without bound where that says nothing."""
+        """Distance [mm] from the last place of a side; infinite where that gives no evidence."""
         if side not in self._places:
             return np.inf
         far = float(np.linalg.norm(hand.joints[PALM] - self._places[side]))
         return far if far < SAME_HAND_MM else np.inf
 
-    def _side(self, hand: Hand, held: dict[int, str], found: dict[str, Hand]) -> str:
-        if hand.id in held and held[hand.id] not in found:
-            return held[hand.id]
+    def _side(self, hand: Hand, known: dict[int, str], found: dict[str, Hand]) -> str:
+        if hand.id in known and known[hand.id] not in found:
+            return known[hand.id]
         free = [side for side in SIDES if side not in found]
         middle = "left" if hand.joints[PALM][0] < 0 else "right"
         near = min(free, key=lambda side: self._far(hand, side), default=middle)
@@ -80,7 +80,7 @@ class LeapPerformer:
     """Frames of both hands, or of one, from the hands of each message.
 
     Args:
-        hands: "both", "left" or "right"; of one hand alone the joints carry their bare names.
+        hands: "both", "left" or "right"; the joints of a single hand have bare names.
     """
 
     def __init__(self, hands: str = BOTH) -> None:
@@ -100,10 +100,15 @@ class LeapPerformer:
         self._fingers: dict[str, dict[int, str]] = {}
 
     def frame(self, hands: Sequence[Hand], time: float, arrival: float) -> SkeletonFrame:
-        """The frame [s] of one message's hands; a message without hands is one with no joint seen.
+        """Return the frame of one message's hands; without hands, no joint in it is seen.
 
-        Tips that no protocol names get their fingers by where they are. Where a server tells of no
-        arm, as older ones, wrist and elbow are put behind the palm, half as sure as it.
+        Tips without a name are assigned to fingers by their positions. Older servers give no arm:
+        wrist and elbow are then placed behind the palm, with half its confidence.
+
+        Args:
+            hands: of the message.
+            time: of the frame [s].
+            arrival: of the message [s].
         """
         joints = len(self.skeleton.names)
         positions, bases = np.full((joints, 3), np.nan), np.full((joints, 3, 3), np.nan)
@@ -135,7 +140,7 @@ class LeapPerformer:
         )
 
     def _name_tips(self, side: str, hand: Hand) -> None:
-        """A tip keeps its finger while no other id comes."""
+        """Name unnamed tips; a tip keeps its finger until a new id appears."""
         if not hand.tips:
             return
         known = self._fingers.get(side, {})
@@ -162,7 +167,7 @@ def _likely_arm(hand: Hand) -> dict[str, Array]:
 
 
 def _rotations(bases: Array) -> Array:
-    """(J, 4) joint to world of bases (J, 3, 3) in device axes; NaN where they are."""
+    """Joint to world (J, 4) from bases (J, 3, 3) in device axes; NaN where a basis is NaN."""
     known = np.isfinite(bases).all(axis=(1, 2))
     rotations = np.full((len(bases), 4), np.nan)
     if known.any():

@@ -1,8 +1,8 @@
-"""The Leap Motion through its service's own library, LeapC: ``leap://``.
+"""Device ``leap://``: the Leap Motion through LeapC, the library of Ultraleap's tracking service.
 
-The library is part of Ultraleap's hand tracking service, so nothing else needs to be installed.
-Source: Ultraleap Gemini SDK 5, LeapC.h; every structure of it is packed without gaps. Millimetres,
-device axes; quaternions (x, y, z, w); a clock in microseconds that is the host's.
+The library is part of Ultraleap's hand tracking software, so nothing else needs to be installed.
+Source: Ultraleap Gemini SDK 5, LeapC.h; all its structures are packed without gaps. Millimetres,
+device axes; quaternions (x, y, z, w); times in microseconds on the host's clock.
 """
 
 from __future__ import annotations
@@ -37,18 +37,18 @@ LIBRARIES = (
     "/Applications/Ultraleap Hand Tracking.app/Contents/LeapSDK/lib/libLeapC.dylib",
 )
 MISSING = (
-    "cannot open leap://: LeapC is not here; install Ultraleap's Hand Tracking software (Gemini 5 "
+    "cannot open leap://: LeapC is missing; install Ultraleap's Hand Tracking software (Gemini 5 "
     "or later), or use leap+ws://127.0.0.1:6437 where a WebSocket service runs"
 )
 MODES = {"desktop": 0, "screentop": 2}
 WAIT_MS = 100
-SILENT_WAITS = 50  # of WAIT_MS without a message after which it is connected to again
+SILENT_WAITS = 50  # waits of WAIT_MS without a message, after which the connection is reopened
 MOST_HANDS = 8
 _TIMEOUT = 0xE2010004
 _BACKGROUND_FRAMES = 0x1
 _CONNECTION, _CONNECTION_LOST, _TRACKING, _DEVICE_LOST = 0x1, 0x2, 0x100, 0x104
 _LEFT = 0
-# Of each joint where a finger's bone starts: which finger and which of its four bones.
+# Of each joint at which a finger's bone starts: the finger, and which of its four bones.
 _STARTS = {
     f"{finger}_{joint}": (row, bone)
     for row, finger in enumerate(FINGERS)
@@ -143,17 +143,17 @@ class Message(ctypes.Structure):
 
 
 class Header(ctypes.Structure):
-    """What goes before the hands from the library to the decoder: time [us], how many hands."""
+    """The data before the hands in the packet from the library to the decoder: time [us], count."""
 
     _pack_ = 1
     _fields_ = (("time", ctypes.c_int64), ("hands", ctypes.c_uint32))
 
 
 class LeapCDecoder:
-    """Frames of a performer's hands from the bytes of tracking events.
+    """Frames of a performer's hands, from the bytes of tracking events.
 
     Attributes:
-        refused: how many were none.
+        refused: packets that could not be decoded.
     """
 
     def __init__(self, hands: str = BOTH) -> None:
@@ -163,12 +163,12 @@ class LeapCDecoder:
 
     @property
     def skeleton(self) -> Skeleton:
-        """Both hands, or the one that was asked for."""
+        """Both hands, or the chosen one."""
         return self._performer.skeleton
 
-    @np.errstate(over="ignore", invalid="ignore")  # whatever a damaged packet holds
+    @np.errstate(over="ignore", invalid="ignore")  # values of a damaged packet
     def feed(self, data: bytes, arrival: float) -> Sequence[SkeletonFrame]:
-        """The frame in a `Header` and its hands that came at `arrival` [s]."""
+        """Return the frame in a `Header` and its hands, received at `arrival` [s]."""
         header = Header()
         size = ctypes.sizeof(Header)
         if len(data) >= size:
@@ -184,7 +184,7 @@ class LeapCDecoder:
 
 
 def _hand(found: np.void) -> Hand:
-    """A hand as the WebSocket would tell of it; what is no number is not there."""
+    """Convert a LEAP_HAND to a `Hand`; joints with invalid numbers are omitted."""
     bones, palm = found["digits"]["bones"], found["palm"]
     starts = bones["start"].astype(np.float64)  # (5, 4, 3)
     places = {name: starts[finger, bone] for name, (finger, bone) in _STARTS.items()}
@@ -214,7 +214,7 @@ def _hand(found: np.void) -> Hand:
 def _bases(turns: Mapping[str, NDArray[np.float32]], palm: Array) -> dict[str, Array]:
     quaternions = np.array(list(turns.values()), dtype=np.float64)
     length = np.linalg.norm(quaternions, axis=1)
-    known = (length > 0.5) & (length < 2.0)  # a bone without length has none
+    known = (length > 0.5) & (length < 2.0)  # a bone without length has no rotation
     found: dict[str, Array] = {}
     if known.any():
         matrices = Rotation.from_quat(quaternions[known]).as_matrix()
@@ -233,7 +233,7 @@ class LeapC:
 
     Args:
         library: LeapC.
-        mode: how the device stands, of `MODES`.
+        mode: orientation of the device, one of `MODES`.
 
     Raises:
         InputError: the library gives no connection.
@@ -266,15 +266,15 @@ class LeapC:
             )
 
     def read(self) -> bytes | None:
-        """The bytes of the next tracking event, or None when another message or none came."""
+        """Return the bytes of the next tracking event, or None for another message or none."""
         message = Message(size=ctypes.sizeof(Message))
         code = self._leap.LeapPollConnection(self._connection, WAIT_MS, ctypes.byref(message))
         if code:
             self._silent += 1
             if code != _TIMEOUT or self._silent > SILENT_WAITS:
                 raise SensorLostError(
-                    f"the Leap's service sends nothing (0x{code:08X}); does it run, and is a Leap "
-                    "plugged in?"
+                    f"the Leap's service sends nothing (0x{code:08X}); start it, and plug in the "
+                    "Leap"
                 )
             return None
         self._silent = 0
@@ -282,7 +282,7 @@ class LeapC:
             self._leap.LeapSetPolicyFlags(self._connection, _BACKGROUND_FRAMES, 0)
             self._leap.LeapSetTrackingMode(self._connection, self._mode)
         elif message.type in (_CONNECTION_LOST, _DEVICE_LOST):
-            raise SensorLostError("the Leap was unplugged, or its service stopped")
+            raise SensorLostError("the Leap was unplugged, or its service stopped; restore it")
         return _event_bytes(message) if message.type == _TRACKING and message.event else None
 
     def close(self) -> None:
@@ -294,7 +294,7 @@ class LeapC:
 
 
 def _event_bytes(message: Message) -> bytes:
-    """A tracking event, which is the library's only until the next message, copied."""
+    """Copy a tracking event, which the library overwrites with the next message."""
     event = TrackingEvent.from_address(message.event)
     count = min(event.hand_count, MOST_HANDS) if event.hands else 0
     hands = ctypes.string_at(event.hands, count * ctypes.sizeof(LeapHand)) if count else b""
@@ -305,7 +305,7 @@ def open_device(address: SplitResult) -> LiveStream:
     """Open ``leap://?hands=both&mode=desktop``.
 
     Raises:
-        InputError: an option is not known, or LeapC or its service is not there.
+        InputError: an option is unknown, or LeapC or its service is missing.
     """
     if address.netloc or address.path.strip("/"):
         raise InputError(

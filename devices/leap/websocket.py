@@ -1,9 +1,9 @@
-"""The Leap Motion's WebSocket: ``leap+ws://127.0.0.1:6437``.
+"""Device ``leap+ws://127.0.0.1:6437``: the Leap Motion's WebSocket.
 
-The service answers there, or `UltraleapTrackingWebSocket` beside newer ones. A service that was
-stopped is tried again twice a second, and told anew what we want of it, since it remembers nothing
-of a connection. One that closes with code 1001 before it has said anything does not know the
-version of the protocol that was asked for: the next lower one is asked for then, and after the
+The Orion service answers at this port, or `UltraleapTrackingWebSocket` beside newer services. A
+stopped service is tried again twice a second; the settings are then sent again, since the service
+does not remember them. A service that closes with code 1001 before its first message does not
+support the requested protocol version: the next lower version is requested then, and after the
 lowest the newest again.
 Source: leapjs, lib/connection/base.js.
 """
@@ -27,24 +27,24 @@ PORT = 6437
 NEWEST = 6
 RETRY = 0.5  # [s]
 PATIENCE = 3.0  # [s] for an answer
-LOOK = 0.1  # [s] after which the reader looks whether it is closed
+LOOK = 0.1  # [s] between checks whether the reader is closed
 GOING_AWAY = 1001
 SETTINGS = ({"background": True}, {"focused": True}, {"optimizeHMD": False})
 
 
 class LeapWebSocket:
-    """A connection that comes back by itself.
+    """A connection that reconnects by itself.
 
     Args:
         host, port: where the service answers.
-        devices: one line on what is wrong with the devices that the service has, or an empty one.
+        devices: returns one line on a fault of the service's devices, or an empty one.
 
     Attributes:
-        dropped: always 0; what the service does not send is not counted.
-        version: of the protocol that is asked for.
+        dropped: always 0; messages that the service skips are not counted.
+        version: of the protocol that is requested.
 
     Raises:
-        InputError: the library for WebSockets is not installed.
+        InputError: the WebSocket library is not installed.
     """
 
     dropped = 0
@@ -62,17 +62,17 @@ class LeapWebSocket:
 
     @property
     def trouble(self) -> str:
-        """Why no frames come just now."""
+        """One line that explains why no frames come now, or an empty one."""
         return self._connection_trouble or self._devices()
 
     def run(self, deliver: Deliver) -> None:
-        """Deliver every message until it is closed, from one connection after another."""
+        """Deliver every message until closed, over successive connections."""
         while not self._closing.is_set():
             self._connect(deliver)
             self._closing.wait(RETRY)
 
     def close(self) -> None:
-        """Let `run` return soon; may be called twice."""
+        """Make `run` return soon; may be called twice."""
         self._closing.set()
 
     def _connect(self, deliver: Deliver) -> None:
@@ -97,8 +97,8 @@ class LeapWebSocket:
             self._connection_trouble = f"{url} closed the connection ({code}); trying again"
         except (OSError, WebSocketException) as error:
             self._connection_trouble = (
-                f"no answer at {url} ({_short(error)}); is the Ultraleap service running, with "
-                "UltraleapTrackingWebSocket beside it if it is newer than Orion?"
+                f"no answer at {url} ({_short(error)}); start the Ultraleap service, or "
+                "UltraleapTrackingWebSocket beside a service that is newer than Orion"
             )
 
     def _messages(self, connection: Any) -> Iterator[bytes]:
@@ -121,10 +121,10 @@ def _short(error: Exception) -> str:
 
 
 def open_device(address: SplitResult) -> LiveStream:
-    """Open ``leap+ws://HOST:PORT?hands=both``; of one hand, "left" or "right", alone if asked so.
+    """Open ``leap+ws://HOST:PORT?hands=both``; `hands` may also be "left" or "right".
 
     Raises:
-        InputError: the address is wrong, or the library for WebSockets is not installed.
+        InputError: the address is wrong, or the WebSocket library is not installed.
     """
     host, port = host_and_port(address, PORT)
     options = options_of(address, {"hands": one_of(BOTH, "left", "right")})

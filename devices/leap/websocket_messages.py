@@ -1,7 +1,7 @@
-"""The Leap Motion's WebSocket protocol, one JSON message at a time.
+"""Decode the Leap Motion's WebSocket protocol, one JSON message at a time.
 
-The first message is a header with the version of the protocol; then come frames, and events that
-say which devices are plugged in and seeing. A server of an older protocol is taken as it is.
+The first message is a header with the protocol version; then come frames, and events that report
+which devices are attached and streaming. A server that speaks an older protocol is accepted.
 Source: leapjs, lib/protocol.js; Leap developer archive, "Leap_JSON".
 """
 
@@ -24,9 +24,9 @@ class LeapDecoder:
     """Frames of a performer's hands from messages of the WebSocket.
 
     Attributes:
-        version: of the protocol that the server speaks; None before its header came.
-        devices: of each device by its id, whether it is attached and whether it is seeing.
-        refused: how many messages were none of this protocol.
+        version: of the server's protocol; None before its header.
+        devices: by device id, whether it is attached and whether it is streaming.
+        refused: messages that do not belong to this protocol.
     """
 
     def __init__(self, hands: str = BOTH) -> None:
@@ -38,21 +38,21 @@ class LeapDecoder:
 
     @property
     def skeleton(self) -> Skeleton:
-        """Both hands, or the one that was asked for."""
+        """Both hands, or the chosen one."""
         return self._performer.skeleton
 
     @property
     def trouble(self) -> str:
-        """One line on why no frames come, as far as the server's events say; else an empty one."""
+        """One line that explains why no frames come, from the server's events; else empty."""
         states = self.devices.values()
         if not states or any(attached and streaming for attached, streaming in states):
             return ""
         if any(attached for attached, _ in states):
-            return "the Leap is plugged in but sees nothing; resume it in its control panel"
-        return "the Leap is not plugged in"
+            return "the Leap is plugged in but paused; resume it in its control panel"
+        return "the Leap is not plugged in; plug it in"
 
     def feed(self, data: bytes, arrival: float) -> Sequence[SkeletonFrame]:
-        """The frame in a message that came at `arrival` [s]; none for a header or an event."""
+        """Return the frame in a message received at `arrival` [s]; none for headers and events."""
         message = _message(data)
         if isinstance(message.get("hands"), list):
             return [self._frame(message, arrival)]
@@ -71,7 +71,7 @@ class LeapDecoder:
         if not isinstance(version, int) or isinstance(version, bool) or "event" in message:
             return False
         self.version = version
-        self.devices.clear()  # a new connection tells of them again
+        self.devices.clear()  # a new connection reports them again
         return True
 
     def _event(self, event: Any) -> bool:
@@ -86,7 +86,7 @@ class LeapDecoder:
 
 
 def _message(data: bytes) -> dict[str, Any]:
-    """The JSON object in `data`; an empty one where there is none."""
+    """The JSON object in `data`; an empty one if there is none."""
     if len(data) > MOST_BYTES:
         return {}
     try:

@@ -1,10 +1,10 @@
-"""The joints of MediaPipe's pose and hand landmarks, joined to one tree.
+"""The joints of MediaPipe's pose and hand landmarks, connected as one tree.
 
-MediaPipe has no pelvis, spine or neck: "mid_hip" and "mid_shoulder" are put between the two sides.
-Of the face the nose, eyes and ears are kept. Landmarks have x to the right of the image, y down and
-z away from the camera; the performer faces the camera, so that (x, -y, -z) is our right-handed
-frame with +Y up, the performer facing +Z and their left at +X. World landmarks are metres from the
-middle of the hips.
+MediaPipe has no pelvis, spine or neck: the joints "mid_hip" and "mid_shoulder" are added between
+the two sides. Of the face, nose, eyes and ears are kept. Landmarks have x to the right of the
+image, y down and z away from the camera; the performer faces the camera, so (x, -y, -z) is our
+right-handed frame with +Y up, the performer facing +Z and their left at +X. World landmarks are
+metres from the middle of the hips.
 Source: MediaPipe Solutions, pose and hand landmarker guides.
 """
 
@@ -40,7 +40,7 @@ MIDDLES = {
     "mid_hip": ("left_hip", "right_hip"),
     "mid_shoulder": ("left_shoulder", "right_shoulder"),
 }
-ROOT = "middle"  # between the parts, where there is no body that joins them
+ROOT = "middle"  # joins the parts where no body does
 
 _BODY: dict[str, str | None] = {"mid_hip": None, "mid_shoulder": "mid_hip", "nose": "mid_shoulder"}
 for _side in SIDES:
@@ -62,7 +62,7 @@ for _side in SIDES:
             ("foot_index", "ankle"),
         )
     }
-# A hand's landmarks run outwards finger by finger, four each; every fifth begins at the wrist.
+# Landmarks of a hand run outwards finger by finger, four each; each finger begins at the wrist.
 HAND_BONES = {
     name: HAND_LANDMARKS[0] if index % 4 == 1 else HAND_LANDMARKS[index - 1]
     for index, name in enumerate(HAND_LANDMARKS)
@@ -72,7 +72,7 @@ PARENTS: Mapping[str, str | None] = _BODY | {
     f"{side}_{name}": f"{side}_{parent}" for side in SIDES for name, parent in HAND_BONES.items()
 }
 
-# [m] the left side of a person who stands with the arms half down; the right is its mirror image.
+# [m] the left side of a standing person with half-lowered arms; the right is its mirror image.
 _REST = {
     "mid_hip": (0.0, 0.0, 0.0),
     "mid_shoulder": (0.0, 0.48, 0.0),
@@ -91,7 +91,7 @@ _REST = {
     "heel": (0.11, -0.90, -0.05),
     "foot_index": (0.13, -0.90, 0.14),
 }
-# Of each finger: degrees towards the thumb's side, [m] to its first joint, [m] between its joints.
+# Of each finger: degrees towards the thumb, [m] to its first joint, [m] between its joints.
 _FINGER_REST = (
     (30.0, 0.035, 0.030),
     (12.0, 0.090, 0.030),
@@ -102,15 +102,15 @@ _FINGER_REST = (
 
 
 def landmarks_to_world(landmarks: ArrayLike) -> Array:
-    """Landmarks (..., 3) in MediaPipe's axes, metres, as our right-handed frame, +Y up."""
+    """Convert landmarks (..., 3) [m] from MediaPipe's axes to our right-handed frame, +Y up."""
     return np.asarray(landmarks, dtype=np.float64) @ LANDMARK_TO_WORLD.T
 
 
 def landmark_skeleton(present: Iterable[str]) -> Skeleton:
-    """The skeleton of those joints of `PARENTS` that are `present`, in the order of the tree.
+    """Return the skeleton of the joints of `PARENTS` that are `present`, in the tree's order.
 
-    A joint's parent is its nearest ancestor among them; where several have none, a root called
-    "middle" joins them.
+    The parent of a joint is its nearest ancestor among them. If several joints have none, a root
+    called "middle" joins them.
     """
     given = set(present)
     names = [name for name in PARENTS if name in given]

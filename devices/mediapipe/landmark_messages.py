@@ -1,8 +1,9 @@
-"""MediaPipe's landmarks as JSON, one message a frame; `docs/devices-cameras.md` has the format.
+"""Decode MediaPipe landmarks from JSON, one message per frame.
 
-The lists carry the names that MediaPipe's own results have. World landmarks have their origin
-between the hips and so lose where the body is; where the image's landmarks and size come too, the
-camera's view tells, and the body walks and jumps. The first place seen is the origin then.
+`docs/devices-cameras.md` describes the format. The lists have the names of MediaPipe's own results.
+World landmarks have their origin between the hips and so lose the place of the body. If the image
+landmarks and the image size come with them, the place follows from the camera's view, so walking
+and jumping are kept. The first place is the origin then.
 """
 
 from __future__ import annotations
@@ -30,12 +31,12 @@ from devices.skeleton import Skeleton, SkeletonFrame
 from devices.transport.clock_map import ClockMap
 
 Array = NDArray[np.float64]
-# Landmarks are (N, 4): x, y, z and confidence in [0, 1]; NaN, NaN, NaN, 0 where there is none.
+# Landmarks are (N, 4): x, y, z and confidence in [0, 1]; NaN, NaN, NaN, 0 where one is missing.
 
 MOST_BYTES = 65536
 MOST_PEOPLE = 16
-FURTHEST = 100.0  # [m], or images
-USUAL_VIEW = 60.0  # [degrees] that a webcam sees from left to right
+FURTHEST = 100.0  # [m], or widths of the image
+USUAL_VIEW = 60.0  # [degrees] horizontal field of view of a webcam
 MOST_PIXELS = 1e5
 _FINGERTIPS = {f"{side}_{finger}" for side in SIDES for finger in ("thumb", "index", "pinky")}
 _HANDS = {f"{side}_{name}" for side in SIDES for name in HAND_LANDMARKS[1:]}
@@ -43,15 +44,15 @@ _POSE_ROW = {name: row for row, name in enumerate(POSE_LANDMARKS)}
 
 
 class LandmarkDecoder:
-    """Frames of everyone in a message.
+    """Frames of all people in a message.
 
     Args:
         hands: whether the skeleton has MediaPipe's hands, 21 points each, instead of the three
-            fingertips that its pose has.
-        view: [degrees] that the camera sees from left to right.
+            fingertips of its pose.
+        view: horizontal field of view of the camera [degrees].
 
     Attributes:
-        refused: how many messages, or people in them, were none.
+        refused: messages, or people in them, that could not be decoded.
     """
 
     def __init__(self, *, hands: bool = False, view: float = USUAL_VIEW) -> None:
@@ -66,11 +67,11 @@ class LandmarkDecoder:
 
     @property
     def skeleton(self) -> Skeleton:
-        """MediaPipe's joints, with a middle of the hips and one of the shoulders."""
+        """MediaPipe's joints, with added middles of the hips and of the shoulders."""
         return self._skeleton
 
     def feed(self, data: bytes, arrival: float) -> Sequence[SkeletonFrame]:
-        """A frame of each person in the message `data` that came at `arrival` [s]."""
+        """Return a frame of each person in the message `data`, received at `arrival` [s]."""
         message = _message(data)
         people = _people(message.get("pose_world_landmarks"), len(POSE_LANDMARKS))
         if people is None:
@@ -93,7 +94,7 @@ class LandmarkDecoder:
         ]
 
     def _extras(self, message: Mapping[str, Any], row: int) -> dict[str, Array]:
-        """What else the message says of the person in `row`: image and hands, where they are."""
+        """The optional landmarks of the person in `row`: image and hands."""
         found = {}
         for name, count in (
             ("pose_landmarks", len(POSE_LANDMARKS)),
@@ -107,9 +108,9 @@ class LandmarkDecoder:
     def _place(
         self, world: Array, extras: Mapping[str, Array], message: Mapping[str, Any], body: int
     ) -> Array:
-        """(3,) [m, MediaPipe's axes] of the hips from where hips were seen first.
+        """Position (3,) [m, MediaPipe's axes] of the hips relative to where hips were first seen.
 
-        Where the image does not tell, the body stays where it was.
+        Without image landmarks the body keeps its place.
         """
         size, image = _size(message.get("image_size")), extras.get("pose_landmarks")
         if size is not None and image is not None:
@@ -124,7 +125,7 @@ class LandmarkDecoder:
         return self._places.get(body, np.zeros(3))
 
     def _joints(self, world: Array, extras: Mapping[str, Array]) -> Array:
-        """(J, 4) the skeleton's joints, from the middle of the hips."""
+        """The skeleton's joints (J, 4), relative to the middle of the hips."""
         table = np.full((len(self._columns), 4), (np.nan, np.nan, np.nan, 0.0))
         for name, row in _POSE_ROW.items():
             if name in self._columns:
@@ -139,16 +140,16 @@ class LandmarkDecoder:
         return table
 
     def _add_hand(self, table: Array, side: str, hand: Array) -> None:
-        """A hand's own landmarks [m], whose origin is in the hand, put on at the body's wrist."""
+        """Add a hand's landmarks [m], whose origin lies in the hand, at the body's wrist."""
         wrist = table[self._columns[f"{side}_wrist"]]
         for row, name in enumerate(HAND_LANDMARKS[1:], 1):
             place = wrist[:3] + hand[row, :3] - hand[0, :3]
-            # MediaPipe fills in no visibility of a hand's points; a hand that is there is seen.
+            # MediaPipe gives hand points no visibility; points of a detected hand count as seen.
             table[self._columns[f"{side}_{name}"]] = [*place, wrist[3]]
 
 
 def _frame(joints: Array, place: Array, number: int, times: tuple[float, float]) -> SkeletonFrame:
-    """A frame of joints (J, 4) from the hips that are at `place`; its time and arrival [s]."""
+    """Frame of joints (J, 4) relative to hips at `place`; `times` are its time and arrival [s]."""
     seen = (joints[:, 3] > 0.0) & np.isfinite(joints).all(axis=1)
     return SkeletonFrame(
         time=times[0],
@@ -171,9 +172,9 @@ def _message(data: bytes) -> dict[str, Any]:
 
 
 def _people(value: Any, count: int) -> list[Array | None] | None:
-    """Landmarks (count, 4) of each person, None for one that has none; None if it is no list.
+    """Landmarks (count, 4) of each person, None for an invalid one; None if `value` is no list.
 
-    The list of one person alone, as MediaPipe's holistic model gives it, is a list of one.
+    A single person's landmarks, as MediaPipe's holistic model gives them, become a list of one.
     """
     if not isinstance(value, list) or len(value) > max(MOST_PEOPLE, count):
         return None
@@ -193,8 +194,8 @@ def _landmarks(value: Any, count: int) -> Array | None:
 
 
 def _landmark(value: Any) -> tuple[float, float, float, float]:
-    """x, y, z and visibility of [x, y, z], [x, y, z, visibility ...] or {"x": ...}; 1 if it is not
-    told how visible it is."""
+    """x, y, z and visibility of [x, y, z], [x, y, z, visibility ...] or {"x": ...}; visibility is 1
+    if it is missing."""
     if isinstance(value, dict):
         value = [value.get(key) for key in ("x", "y", "z", "visibility")]
         value = value[:3] if value[3] is None else value
@@ -224,7 +225,7 @@ def _size(value: Any) -> tuple[float, float] | None:
 
 
 def _ids(value: Any, count: int) -> list[int]:
-    """Who each person is, as the sender says; else by the place in the list."""
+    """The sender's id of each person, else the person's place in the list."""
     if isinstance(value, list) and len(value) == count and len({*map(str, value)}) == count:
         numbers = [_number(item) for item in value]
         if all(number is not None and number == int(number) for number in numbers):

@@ -1,8 +1,8 @@
-"""MediaPipe: ``mediapipe://127.0.0.1:7005`` for landmarks that another program sends, and
-``mediapipe://webcam?model=FILE.task`` to look for them in a webcam's picture here.
+"""Device ``mediapipe://HOST:PORT`` (landmarks from another program) and ``mediapipe://webcam``.
 
-The first needs nothing; `docs/devices-cameras.md` has a sender of twenty lines. The second needs
-the extra and a model file of MediaPipe's pose landmarker. Both go through the same decoder.
+``mediapipe://127.0.0.1:7005`` needs nothing; `docs/devices-cameras.md` has a sender of twenty
+lines. ``mediapipe://webcam?model=FILE.task`` runs MediaPipe on a webcam; it needs the extra and a
+model file of MediaPipe's pose landmarker. Both use the same decoder.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ def open_device(address: SplitResult) -> LiveStream:
         options = options_of(address, readers | {"model": Path, "camera": _camera})
         if "model" not in options:
             raise InputError(
-                f"cannot open {address.geturl()!r}: MediaPipe comes without models; name the file "
-                "of a pose landmarker: mediapipe://webcam?model=FILE.task"
+                f"cannot open {address.geturl()!r}: MediaPipe has no built-in models; give the "
+                "file of a pose landmarker: mediapipe://webcam?model=FILE.task"
             )
         model, camera = options["model"], options.get("camera", 0)
         return LiveStream(

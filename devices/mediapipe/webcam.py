@@ -1,4 +1,4 @@
-"""A webcam's picture searched for people by MediaPipe, on the device's reader thread."""
+"""Detect people in a webcam's pictures with MediaPipe, on the device's reader thread."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ class Webcam:
     """An open camera and a pose landmarker.
 
     Args:
-        model: the pose landmarker's model file (.task), which MediaPipe does not bring along.
+        model: the pose landmarker's model file (.task), which is not part of MediaPipe's package.
         camera: number of the camera.
 
     Raises:
-        InputError: the extra is not installed, there is no such file, MediaPipe cannot read it, or
-            there is no such camera.
+        InputError: the extra is not installed, the file does not exist, MediaPipe cannot read it,
+            or there is no such camera.
     """
 
     def __init__(self, model: Path, camera: int) -> None:
@@ -41,7 +41,7 @@ class Webcam:
         except (RuntimeError, ValueError, OSError) as error:
             reason = " ".join(str(error).split())[:120]
             raise InputError(
-                f"cannot open mediapipe://webcam: {model} is no pose landmarker's model ({reason})"
+                f"cannot open mediapipe://webcam: {model} is not a pose landmarker model ({reason})"
             ) from error
         self._camera = cv2.VideoCapture(camera)
         if not self._camera.isOpened():
@@ -52,10 +52,10 @@ class Webcam:
             )
 
     def read(self) -> bytes | None:
-        """A message with the landmarks in the next picture."""
+        """Return a message with the landmarks in the next picture."""
         there, picture = self._camera.read()
         if not there:
-            raise SensorLostError("the webcam gives no picture any more; is it plugged in?")
+            raise SensorLostError("the webcam no longer gives pictures; plug it in again")
         image = self._mediapipe.Image(
             image_format=self._mediapipe.ImageFormat.SRGB,
             data=self._cv2.cvtColor(picture, self._cv2.COLOR_BGR2RGB),
@@ -66,7 +66,7 @@ class Webcam:
         return landmark_message(found, milliseconds, (width, height))
 
     def close(self) -> None:
-        """Give the camera back."""
+        """Release the camera."""
         self._landmarker.close()
         self._camera.release()
 
@@ -83,11 +83,11 @@ def _landmarker(mediapipe: Any, model: Path) -> Any:
 
 
 def landmark_message(result: Any, milliseconds: int, size: tuple[int, int]) -> bytes:
-    """The message of a MediaPipe result.
+    """Return the message for a MediaPipe result.
 
     Args:
-        result: what a pose landmarker returns.
-        milliseconds: when the picture was taken.
+        result: of a pose landmarker.
+        milliseconds: time of the picture.
         size: width and height [pixels] of the picture.
     """
 

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from tqdm import tqdm
 
-from devices.bridge.keys import CAPTURE, STAGE, make_keys
+from devices.bridge.keys import PUBLISHER, SUBSCRIBER, make_keys
 from devices.errors import InputError
 from devices.skeleton import Skeleton
 from devices.stream import SkeletonStream, open_stream
@@ -34,7 +34,7 @@ def bridge(options: argparse.Namespace) -> int:
     if options.device is None:
         raise InputError("a bridge needs --device URL, as `bunraku devices` lists them")
     with open_stream(options.device) as stream:
-        where = binding(options.bind, options.keys, option=f"--keys DIR/{CAPTURE}")
+        where = binding(options.bind, options.keys, option=f"--keys DIR/{PUBLISHER}")
         publisher = open_publisher(where, stream.skeleton)
         try:
             _carry(stream, publisher, options.seconds or math.inf)
@@ -78,8 +78,12 @@ def _carry(stream: SkeletonStream, publisher: BridgePublisher, seconds: float) -
 
 def _make_keys(folder: Path) -> int:
     make_keys(folder)
-    print(f"{folder / CAPTURE}: for the machine of the device: bunraku bridge --keys {CAPTURE} ...")
     print(
-        f"{folder / STAGE}: take it to the machine of the stage: zmq+tcp://HOST:PORT?keys={STAGE}"
+        f"{folder / PUBLISHER}: for the machine of the device: "
+        f"bunraku bridge --keys {PUBLISHER} ..."
+    )
+    print(
+        f"{folder / SUBSCRIBER}: copy it to the machine of the show: "
+        f"zmq+tcp://HOST:PORT?keys={SUBSCRIBER}"
     )
     return 0

@@ -177,7 +177,7 @@ def test_the_recording_is_the_same_performance() -> None:
     assert recording.rotations is not None
     assert (recording.confidence == 1.0).all()
     assert np.linalg.norm(recording.rotations, axis=2) == pytest.approx(1.0, abs=1e-12)
-    with pytest.raises(InputError, match="built-in performance"):
+    with pytest.raises(InputError, match="no built-in motion"):
         builtin_recording("nonsense")
 
 

@@ -219,7 +219,7 @@ def test_device_events_say_what_is_wrong() -> None:
     assert decoder.trouble == ""
     for attached, streaming, says in (
         (True, True, ""),
-        (True, False, "sees nothing"),
+        (True, False, "plugged in but paused"),
         (False, False, "not plugged in"),
         (True, True, ""),
     ):
@@ -503,7 +503,7 @@ def test_hostile_messages_and_a_device_that_is_unplugged_leave_the_stream_runnin
 
     with serving(serve) as (_, port), opened(port) as stream:
         take(stream, 1)
-        assert stream.traffic.trouble == "the Leap is not plugged in"
+        assert stream.traffic.trouble == "the Leap is not plugged in; plug it in"
         assert stream.traffic.refused == sum(len(data) < 1 << 20 for data in HOSTILE)
 
 
@@ -529,10 +529,10 @@ def test_closing_while_nobody_answers_takes_no_time() -> None:
 @pytest.mark.parametrize(
     ("url", "says"),
     [
-        ("leap+ws://127.0.0.1:99999", "no number from 0 to 65535"),
+        ("leap+ws://127.0.0.1:99999", "not a number from 0 to 65535"),
         ("leap+ws://127.0.0.1:6437/v6.json", "HOST:PORT only"),
         ("leap+ws://127.0.0.1?hands=three", "both or left or right"),
-        ("leap+ws://127.0.0.1?version=5", "'version' is not known"),
+        ("leap+ws://127.0.0.1?version=5", "'version' is unknown"),
     ],
 )
 def test_an_address_that_cannot_be_opened_is_one_clear_line(url: str, says: str) -> None:

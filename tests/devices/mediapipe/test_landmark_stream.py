@@ -297,7 +297,7 @@ def test_what_mediapipe_returns_is_the_message_that_the_decoder_reads() -> None:
         ("mediapipe://webcam?model=a.task&camera=front", "camera's number"),
         ("mediapipe://127.0.0.1:7005?view=300", "from 10 to 170"),
         ("mediapipe://127.0.0.1:7005?hands=two", "on or off"),
-        ("mediapipe://127.0.0.1:7005?model=x", "'model' is not known"),
+        ("mediapipe://127.0.0.1:7005?model=x", "'model' is unknown"),
     ],
 )
 def test_an_address_that_cannot_be_opened_is_one_clear_line(url: str, says: str) -> None:
