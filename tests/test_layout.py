@@ -62,11 +62,12 @@ def loaded_by(code: str) -> set[str]:
 
 
 def every_module_of(room: str) -> str:
-    """Code that imports all of a room."""
+    """Code that imports all of a room but what is there to be run."""
     return (
         f"import importlib, pkgutil, {room}\n"
         f"for module in pkgutil.walk_packages({room}.__path__, '{room}.'):\n"
-        f"    importlib.import_module(module.name)"
+        f"    if not module.name.endswith('.__main__'):\n"
+        f"        importlib.import_module(module.name)"
     )
 
 

@@ -1,1 +1,1 @@
-"""Benchmarks: each module has `run() -> dict`, prints a table and returns its figures."""
+"""Benchmarks: each module measures one part of the program; `bunraku bench NAME` runs it."""

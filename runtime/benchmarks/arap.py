@@ -1,4 +1,4 @@
-"""How long an iteration of ARAP takes, beside libigl's C++ on the same mesh in the same run."""
+"""Benchmark: an iteration of ARAP, beside libigl's C++ on the same mesh in the same run."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ from solvers.linear.constrained_system import ConstrainedSystem, Hold
 
 SIZES = (2_500, 10_000, 40_000, 160_000)
 REPEATS = 9
-ITERATIONS = 5  # of the longer of two runs, whose difference leaves out what is not iterating
+ITERATIONS = 5  # in the longer of two solves; the difference of the two is iterations only
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 
 def run(sizes: Sequence[int] = SIZES) -> dict[str, object]:
-    """Print a table and return it: milliseconds per iteration at the median, ours and libigl's."""
+    """Print and return a table: the median of milliseconds per iteration, ours and libigl's."""
     bandwidth = _bandwidth()
     threads = get_num_threads()
     print(f"arap: one iteration, up to {threads} threads; copying moves {bandwidth:.0f} GB/s")
@@ -55,7 +55,7 @@ def run(sizes: Sequence[int] = SIZES) -> dict[str, object]:
 
 
 def _measure(vertices: Floats, faces: Ints) -> dict[str, Any]:
-    """Both solvers on the same handles and targets, in turn, so that both see the same machine."""
+    """Measure both solvers in turn on the same handles and targets, under the same load."""
     handles, targets = pulled_patch(vertices)
     start = perf_counter()
     ours = ArapSolver(vertices, faces, handles)
@@ -64,7 +64,7 @@ def _measure(vertices: Floats, faces: Ints) -> dict[str, Any]:
     peer = _libigl(vertices, faces, handles, targets, answer)
     stages, moved = _stages(vertices, faces, handles)
     for stage in stages.values():
-        stage()  # compiled, and its memory touched, before it is timed
+        stage()  # compile it and touch its memory before it is timed
     calls: dict[str, Callable[[], object]] = {
         "one": partial(ours.solve, targets, 1),
         "many": partial(ours.solve, targets, ITERATIONS),
@@ -94,7 +94,7 @@ def _measure(vertices: Floats, faces: Ints) -> dict[str, Any]:
 def _stages(
     vertices: Floats, faces: Ints, handles: Ints
 ) -> tuple[dict[str, Callable[[], object]], int]:
-    """The three stages of an iteration by themselves, and the bytes that they cannot but move."""
+    """Return the three stages of an iteration, and the bytes that an iteration must move."""
     layout = lay_out(vertices, faces)
     x = vertices[layout.order].copy()
     mesh = build_cells(x, layout.faces, SPOKES)
@@ -116,7 +116,7 @@ def _stages(
 def _libigl(
     vertices: Floats, faces: Ints, handles: Ints, targets: Floats, start: Floats
 ) -> Callable[[int], object] | None:
-    """A call of libigl's solver for a number of iterations; None without libigl."""
+    """Return a function that runs libigl's solver for n iterations; None without libigl."""
     try:
         import igl  # noqa: PLC0415  # an optional extra
     except ImportError:
@@ -146,7 +146,7 @@ def _copy(source: Floats, target: Floats) -> None:
 
 
 def _bandwidth() -> float:
-    """Gigabytes a second that all cores together copy at best; caches may be faster."""
+    """Return the gigabytes a second that all cores together copy; caches may be faster."""
     source, target = np.ones(8_000_000), np.empty(8_000_000)
     _copy(source, target)
     best = min(_milliseconds(lambda: _copy(source, target)) for _ in range(8))

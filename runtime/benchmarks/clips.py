@@ -1,9 +1,8 @@
-"""Whole performances: how long their ticks take, and in what order they leave their surfaces.
+"""Benchmark: whole performances; the time of their ticks and the quality of the surfaces.
 
-Every clip drives every character, as `bunraku replay --fast` would without a picture. For each clip
-the worst of its characters is told: tick times, edge stretch at the 99th percentile over all
-frames, and triangles that are inverted at the end or were so for long
-(`runtime.output.report.watchdog`).
+Every clip drives every character, as `bunraku replay --fast` does, without pictures. A line shows
+the worst character of a clip: tick times, the 99th percentile of edge stretch over all frames, and
+inverted triangles, at the end and the longest (`runtime.output.report.watchdog`).
 """
 
 from __future__ import annotations
@@ -31,17 +30,17 @@ from runtime.puppet.puppet import Puppet
 from runtime.render.camera import front_camera
 from runtime.show.loop import FrameLoop
 
-FRAME_MS = 16.0  # that no tick may take
+FRAME_MS = 16.0  # the longest tick that is allowed
 
 
 def run(
     recording: Sequence[Path] | None = None, character: Sequence[str] | None = None
 ) -> dict[str, object]:
-    """Print a line a clip and return the figures of every clip and character.
+    """Print a line for each clip and return the figures of every clip and character.
 
     Args:
-        recording: files to play; the built-in acts where None.
-        character: meshes or names; the built-in characters where None.
+        recording: files to play; None for the built-in motions.
+        character: meshes or names; None for the built-in characters.
     """
     clips = [(path.name, read_recording(path)) for path in recording or ()]
     clips = clips or [(act, builtin_recording(act)) for act in MOTIONS]

@@ -1,8 +1,8 @@
-"""What a proxy saves on a dense character, and how far it is from the full solve.
+"""Benchmark: the time that a proxy saves on a dense character, and its error.
 
-Both deform the same character in the same run, frame by frame, by the same handles. Beside the
-proxy's distance from the full solve stands the full solve's own distance from where it would
-settle, had it time: the yardstick for what an answer within a tick is worth.
+Proxy and full solve deform the same character in the same run, frame by frame, with the same
+handles. The table shows the proxy's distance from the full solve and, to compare with, the full
+solve's own distance from the converged answer.
 """
 
 from __future__ import annotations
@@ -33,11 +33,11 @@ from solvers.surface.edges import Edges
 
 SIZES = (10_000, 20_000, 40_000, 100_000, 160_000, 300_000)
 FRAMES = 100
-STEP = 4  # frames of the recording: 15 a second, as a slow camera gives
-COMPARED = 10  # every so many frames that are performed
-ITERATIONS = 2  # a tick, as a show has
-SETTLED = 60  # iterations after which nothing moves
-MOST_SETTLED = 50_000  # vertices up to which the settled answer is computed
+STEP = 4  # frames of the recording from one to the next: 15 a second, as from a slow camera
+COMPARED = 10  # performed frames from one comparison to the next
+ITERATIONS = 2  # a tick, as in a show
+SETTLED = 60  # iterations of the converged answer
+MOST_SETTLED = 50_000  # the largest number of vertices for which it is computed
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -45,7 +45,7 @@ Figures = dict[str, float]
 
 
 def run(sizes: Sequence[int] = SIZES, frames: int = FRAMES) -> dict[str, object]:
-    """Print a table and return it: milliseconds a tick at the median, and the error."""
+    """Print and return a table: the median of milliseconds a tick, and the error."""
     print(f"dense: {ITERATIONS} iterations a tick, {get_num_threads()} threads, proxy over {DENSE}")
     print(
         f"{'vertices':>8} {'full ms':>8} {'proxy':>6} {'follow':>6} {'times':>5} {'GB/s':>5}"
@@ -75,7 +75,7 @@ def _line(row: dict[str, Any]) -> str:
 
 
 def dense_character(count: int) -> Character:
-    """The built-in mannequin with about `count` vertices: subdivided after Loop, then thinned."""
+    """Return the mannequin with about `count` vertices: Loop subdivision, then decimation."""
     import trimesh  # noqa: PLC0415  # slow to import
 
     character = builtin_character("mannequin")
@@ -91,7 +91,7 @@ def dense_character(count: int) -> Character:
 
 @dataclass(frozen=True, slots=True)
 class _Handles:
-    """What moves the surface: coarse vertices (H,), their groups (H,), targets (H, 3) a frame."""
+    """The handles: coarse vertices (H,), their groups (H,), and targets (H, 3) for each frame."""
 
     chosen: Ints
     groups: Ints
@@ -101,13 +101,13 @@ class _Handles:
 def measure(
     character: Character, recording: Recording, *, settle: bool, frames: int = FRAMES
 ) -> dict[str, Any]:
-    """Perform with both; times are medians [ms], errors are taken over all frames compared.
+    """Perform with proxy and full solve; return median times [ms] and errors over all frames.
 
     Args:
-        character: of any size.
-        recording: what drives it.
-        settle: compute the settled answer too.
-        frames: from the start of the recording.
+        character: a character of any size.
+        recording: the performance that drives it.
+        settle: whether to compare with the converged answer, too.
+        frames: the number of frames from the start of the recording.
     """
     start = perf_counter()
     proxy = proxy_of(character, dense=0, count=min(PROXY, len(character.vertices) // 2))
@@ -153,7 +153,7 @@ def measure(
 
 
 def _perform(character: Character, proxy: Proxy, recording: Recording, frames: int) -> _Handles:
-    """Let a puppet of the proxy perform, and note where its handles go."""
+    """Perform with a puppet of the proxy and return its handles."""
     weights = None if character.weights is None else character.weights[proxy.kept]
     coarse = replace(character, vertices=proxy.vertices, faces=proxy.faces, weights=weights)
     puppet = Puppet(coarse)
@@ -171,7 +171,7 @@ def _perform(character: Character, proxy: Proxy, recording: Recording, frames: i
 
 
 class Comparison:
-    """Tells two deformed states of a surface apart.
+    """Measures the difference of two deformed states of a surface.
 
     Args:
         vertices: (N, 3) at rest.
@@ -184,7 +184,7 @@ class Comparison:
         self._size = float(np.linalg.norm(np.ptp(vertices, axis=0)))
 
     def figures(self, found: Floats, full: Floats) -> Figures:
-        """How far `found` (N, 3) is from `full` (N, 3).
+        """Return the distance of `found` (N, 3) from `full` (N, 3).
 
         Returns:
             rms, p99: distance of the vertices, percent of the diagonal of the rest pose's box;
@@ -220,7 +220,7 @@ class Comparison:
 
 
 def _over_all(figures: Sequence[Figures]) -> Figures:
-    """The root of the mean square of each figure; empty where nothing was compared."""
+    """Return the root mean square of each figure; empty without comparisons."""
     if not figures:
         return {}
     return {

@@ -1,4 +1,4 @@
-"""What it costs a frame when handles come, go or are held otherwise while a show runs."""
+"""Benchmark: a frame in which handles are added, removed or weighted differently."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from runtime.characters.open_character import load_character
 from runtime.puppet.puppet import Puppet
 from solvers.arap import ArapSolver
 
-FRAME = 16.0  # [ms] that a change may cost, its frame's own iterations included
+FRAME = 16.0  # [ms] allowed for a change together with the iterations of its frame
 ITERATIONS = 2
 CHANGES = 12
 
@@ -23,7 +23,7 @@ Ints = NDArray[np.int64]
 
 
 def run() -> dict[str, object]:
-    """Print, by character, a usual frame and the frames in which something changes [ms]."""
+    """Print for each character the time of a usual frame and of frames with a change [ms]."""
     print(f"hold: a frame of {ITERATIONS} iterations with a change in it, ms, median / worst")
     print(
         f"{'character':<12} {'vertices':>8} {'usual':>13} {'let go':>13} {'hold':>13} {'weigh':>13}"
@@ -58,7 +58,7 @@ def _measure(name: str) -> dict[str, Any]:
         solver.solve(rest[held], ITERATIONS, out=out)
         times[kind].append(1e3 * (perf_counter() - start))
 
-    for number in range(-2, CHANGES):  # the first two are not counted: memory is touched
+    for number in range(-2, CHANGES):  # the first two only touch the memory
         kept = anchors != anchors[(number * 37) % len(anchors)]
         some, groups = handles[kept], anchors[kept]
         timed("usual", handles, lambda: None)

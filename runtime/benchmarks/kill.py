@@ -1,4 +1,4 @@
-"""`kill -9` while four performers are recorded at 60 Hz: each file opens, little is missing."""
+"""Benchmark: `kill -9` during a recording of four performers; readable files, missing time."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ from runtime.show.warn import warn
 
 MOMENTS = 50
 PERFORMERS = 4
-LONGEST = 3.0  # [s] that a recording runs before it is killed
+LONGEST = 3.0  # [s] a recording runs at most before it is killed
 MOST_MISSING = 1.0  # [s]
 POLLS = 240.0  # a second
-_STAMP = struct.Struct("<dq")  # time [s] and performer of a frame that came
+_STAMP = struct.Struct("<dq")  # time [s] and performer of a frame that arrived
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,10 +36,10 @@ class Killed:
     """A recording whose process was killed.
 
     Attributes:
-        came: frames that had come.
-        kept: how many the file gives back.
-        whole: whether those are the first that came, each, in order.
-        missing: [s] from the last frame in the file to the last that came.
+        came: the number of frames that had arrived.
+        kept: the number of frames that the file gives back.
+        whole: whether those are the first frames that arrived, without gaps, in order.
+        missing: [s] from the last frame in the file to the last frame that arrived.
     """
 
     came: int
@@ -49,7 +49,7 @@ class Killed:
 
 
 def run() -> dict[str, object]:
-    """Kill 50 recordings at random moments of their first 3 s; print and return what is left."""
+    """Kill 50 recordings at random moments of their first 3 s; print and return what remains."""
     print(f"kill: {MOMENTS} recordings of {PERFORMERS} performers at 60 Hz, killed", flush=True)
     moments = random.Random(0)
     with tempfile.TemporaryDirectory() as folder:
@@ -72,10 +72,10 @@ def run() -> dict[str, object]:
 
 
 def killed_recording(path: Path, seconds: float) -> Killed:
-    """Record to `path` in a process of its own, kill it `seconds` after its first frame, and look.
+    """Record to `path` in another process, kill it `seconds` after its first frame, read the file.
 
     Raises:
-        InputError: the file does not open.
+        InputError: the file cannot be opened.
     """
     command = [sys.executable, "-m", "runtime.benchmarks.kill", str(path)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, cwd=_ROOT) as process:
@@ -92,7 +92,7 @@ def killed_recording(path: Path, seconds: float) -> Killed:
 
 
 def _record_for_ever(path: Path) -> None:
-    """Record simulated performers to `path` and tell standard output of each frame that came."""
+    """Record simulated performers to `path`; write a stamp of each frame to standard output."""
     stream = Simulator(motion_clip("show"), performers=PERFORMERS)
     recorder = Recorder(path, stream.skeleton, tell=warn)
 

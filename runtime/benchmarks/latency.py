@@ -1,4 +1,4 @@
-"""From a packet to deformed vertices on the GPU: another process sends, the whole loop performs."""
+"""Benchmark: the time from a packet of another process to deformed vertices on the GPU."""
 
 from __future__ import annotations
 
@@ -39,10 +39,10 @@ RATES = (30.0, 60.0, 120.0)
 WAYS = ("zmq", "vmc")
 CHARACTER = "mannequin"
 SIZE = (320, 180)
-WARM_UP = 1.0  # [s] that does not count
-MEASURED = 8.0  # [s] that do
+WARM_UP = 1.0  # [s] before the measurement
+MEASURED = 8.0  # [s] of measurement
 BUDGET_MS = {"p50": 4.0, "p99": 10.0}
-PATIENCE = 5.0  # [s] without a frame after which no more will come
+PATIENCE = 20.0  # [s] without a frame before the remaining packets count as lost
 _BUSY = "while True: pass"
 
 Array = NDArray[np.float64]
@@ -55,12 +55,11 @@ class Times:
     """Host monotonic times [s] of each performed frame, (F,).
 
     Attributes:
-        sent: just before it left the other process, as far as its time says; VMC's clock is only
-            known from the least delay seen.
-        came: when its last packet was read.
-        uploaded: when its deformed vertices were on the GPU and the GPU was done.
-        drawn: when its picture was, headless in place of the swap; NaN where none was drawn.
-        lost: frames that were sent and never performed, because a newer one was there.
+        sent: just before it left the other process; VMC's clock is estimated from the least delay.
+        came: its last packet was read.
+        uploaded: its deformed vertices were on the GPU and the GPU had finished.
+        drawn: its picture was finished, without a window's swap; NaN without pictures.
+        lost: the number of frames that were sent but not performed, because a newer one had come.
     """
 
     sent: Array
@@ -71,7 +70,7 @@ class Times:
 
 
 def run(*, load: bool = False) -> dict[str, object]:
-    """Print and return percentiles [ms] for every way and rate; with `load` also on a busy core."""
+    """Print and return percentiles [ms] by way and rate; with `load` also beside a busy process."""
     context = headless_context()
     software = is_software(context)
     vertices = len(builtin_character(CHARACTER).vertices)
@@ -104,10 +103,10 @@ def run(*, load: bool = False) -> dict[str, object]:
 def measured(
     context: Context, way: str, rate: float, *, drawn: bool, seconds: float = MEASURED
 ) -> Times:
-    """Perform what another process sends by one way at one rate, for so long [s].
+    """Perform the frames that another process sends by one way at one rate for `seconds` [s].
 
     Raises:
-        InputError: nothing came in time.
+        InputError: no frame of the measurement arrived.
     """
     count = round(rate * (WARM_UP + seconds))
     with ExitStack() as closing:
@@ -119,6 +118,7 @@ def measured(
             udp = UdpTransport("127.0.0.1", 0, scheme="vmc")
             stream = closing.enter_context(LiveStream(udp, VmcDecoder))
             sender = closing.enter_context(_sender(way, rate, count, str(udp.port)))
+            _line(sender)  # it is ready
         show = _Show(context, _Noted(stream), drawn=drawn)
         closing.callback(show.scene.close)
         closing.enter_context(objects_frozen())
@@ -128,7 +128,7 @@ def measured(
 
 
 class _Noted:
-    """A live stream that remembers how many frames it gave, and the newest."""
+    """A live stream that counts the frames it gave and keeps the newest."""
 
     def __init__(self, stream: Live) -> None:
         self.stream = stream
@@ -160,7 +160,7 @@ class _Noted:
 
 
 class _Stamping(Scene):
-    """A theatre that says when [s] the GPU had the vertices, and when the picture was there."""
+    """A scene that notes when [s] the vertices were on the GPU and when the picture was drawn."""
 
     context: Context
     draws = True
@@ -179,7 +179,7 @@ class _Stamping(Scene):
 
 
 class _Show:
-    """A live show of one character, as `bunraku live` has it."""
+    """A live show of one character, as `bunraku live` runs it."""
 
     def __init__(self, context: Context, stream: _Noted, *, drawn: bool) -> None:
         self._stream = stream
@@ -203,7 +203,7 @@ class _Show:
         )
 
     def perform(self, count: int) -> None:
-        """Perform until so many frames have come, or none comes any more."""
+        """Perform until `count` frames have come, or none has come for `PATIENCE`."""
         stream, scene = self._stream, self.scene
         pace = OnArrival(stream.stream)
         spare = SpareTime(pace, self._loop)
@@ -220,18 +220,18 @@ class _Show:
                 self._rows.append((stream.given, *stamps))
 
     def times(self, count: int, skipped: int) -> Times:
-        """What was noted of `count` frames, but for the first `skipped`."""
+        """Return the times of `count` frames without the first `skipped`."""
         rows = np.array([row for row in self._rows if row[0] > skipped])
         if len(rows) == 0:
             raise InputError(
-                "none of the benchmark's packets came in time; try again on a machine less busy"
+                "none of the benchmark's packets arrived; try again while the machine is less busy"
             )
         lost = max(count - skipped - len(rows), 0)
         return Times(rows[:, 1], rows[:, 2], rows[:, 3], rows[:, 4], lost)
 
 
 def _told(what: str, plain: Times, drawn: Times) -> dict[str, object]:
-    """One line, and its figures [ms]."""
+    """Print one line and return its figures [ms]."""
     packet, sent = (_spread(plain.uploaded - since) for since in (plain.came, plain.sent))
     vertices, picture = (_spread(until - drawn.came) for until in (drawn.uploaded, drawn.drawn))
     print(
@@ -258,7 +258,7 @@ def _spread(seconds: Array) -> dict[str, float]:
 
 @contextmanager
 def _sender(*arguments: object) -> Iterator[subprocess.Popen[str]]:
-    """The other process, until it is not needed any more."""
+    """Run the other process during the block."""
     with subprocess.Popen(
         [sys.executable, "-m", "runtime.benchmarks.latency_sender", *map(str, arguments)],
         stdin=subprocess.PIPE,
@@ -273,7 +273,7 @@ def _sender(*arguments: object) -> Iterator[subprocess.Popen[str]]:
 
 @contextmanager
 def _busy_core(busy: bool) -> Iterator[None]:
-    """A process beside that never rests."""
+    """Keep a core busy with another process during the block."""
     if not busy:
         yield
         return

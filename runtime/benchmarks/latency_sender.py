@@ -1,7 +1,8 @@
-"""The other process of `bunraku bench latency`: a performer who sends at an exact rate.
+"""The other process of `bunraku bench latency`: it sends a performer's frames at an exact rate.
 
-It prints where it sends from if others must know, begins when it is told a line, and stays until
-its input is closed. Frames carry the host monotonic time just before they went out.
+It prints a line when it is ready: the address that it publishes at, or "ready". It begins after one
+line on its input and stays until the input is closed. Each frame carries the host monotonic time
+of its sending.
 """
 
 from __future__ import annotations
@@ -44,7 +45,7 @@ def main(arguments: list[str]) -> None:
 
 
 def _send_all(played: MotionClip, send: Send, rate: float, count: int) -> None:
-    """Send `count` frames; the performance goes by as fast at every rate."""
+    """Send `count` frames; the performance has the same speed at every rate."""
     ticker = Ticker(rate)
     for number in range(count):
         ticker.wait()
@@ -70,6 +71,7 @@ def _by_bridge(played: MotionClip, closing: ExitStack) -> Send:
 def _by_vmc(played: MotionClip, port: int, closing: ExitStack) -> Send:
     performer = Performer(played.skeleton)
     sender = closing.enter_context(VmcPerformer(performer, "127.0.0.1", port))
+    print("ready", flush=True)
 
     def send(frame: SkeletonFrame) -> None:
         performer.follow(frame)

@@ -1,7 +1,7 @@
-"""How long matching and driving a character take each frame.
+"""Benchmark: matching a performer with a character, and driving it, each frame.
 
-Matching a performer with 2 to 5 branches against characters of 200 nodes, beside the budget of
-0.5 ms; and the motion of such a match, from joints to all nodes.
+It matches performers with 2 to 5 branches against characters of 200 nodes, with a budget of 0.5 ms,
+and computes the motion of such a match, from joints to all nodes.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ Figures = dict[str, float]
 
 
 def run() -> dict[str, object]:
-    """Print a table and return it: milliseconds at the median and the 99th percentile."""
+    """Print and return a table: milliseconds at the median and the 99th percentile."""
     targets = {"tentacles": _star(8), "sea urchin": _star(40), "bush": _bush()}
     matching: dict[str, Figures] = {}
     print(f"match: {NODES} nodes, best 20 of all, {FRAMES} poses; budget {BUDGET_MS} ms")
@@ -69,7 +69,7 @@ def _measure(hierarchy: TargetHierarchy, rest: Tree) -> Figures:
 
 
 def _driver(target: Tree, rest: Tree, match: Match) -> Callable[[NDArray[np.float64]], object]:
-    """What a frame costs once a match is chosen: rotations of all chains, then all nodes."""
+    """Return the work of a frame with a chosen match: rotations of all chains, then all nodes."""
     sources = [list(source) for source, _ in match.pairs]
     driven = [list(chain) for _, chain in match.pairs]
     maps = [
@@ -84,7 +84,7 @@ def _driver(target: Tree, rest: Tree, match: Match) -> Callable[[NDArray[np.floa
 def _times(
     function: Callable[[NDArray[np.float64]], object], poses: NDArray[np.float64]
 ) -> list[float]:
-    """Milliseconds for each pose."""
+    """Return the milliseconds for each pose."""
     times = []
     for pose in poses:
         start = perf_counter()
@@ -94,7 +94,7 @@ def _times(
 
 
 def _star(arms: int, count: int = NODES) -> Tree:
-    """Arms of equal length around one node, in the screen plane."""
+    """Return arms of equal length around one node, in the screen plane."""
     each = (count - 1) // arms
     parents, positions = [-1], [(0.0, 0.0, 0.0)]
     for arm in range(arms):
@@ -106,7 +106,7 @@ def _star(arms: int, count: int = NODES) -> Tree:
 
 
 def _bush() -> Tree:
-    """A tree with many forks, as a surface with fringes gives."""
+    """Return a tree with many forks, such as the skeleton of a surface with fringes."""
     rng = np.random.default_rng(1)
     parents, positions = [-1], [np.zeros(3)]
     for node in range(1, NODES):

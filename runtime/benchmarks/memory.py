@@ -1,4 +1,4 @@
-"""How much memory this process has."""
+"""The resident memory of this process."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from devices.errors import InputError
 
 
 def resident_memory() -> int:
-    """Memory of this process that is in RAM now [bytes].
+    """Return the memory of this process that is in RAM now [bytes].
 
     Raises:
-        InputError: this system does not tell.
+        InputError: this system is not Linux.
     """
     if not sys.platform.startswith("linux"):
         raise InputError("resident memory is measured on Linux only; run this benchmark there")

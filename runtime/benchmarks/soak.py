@@ -1,9 +1,10 @@
-"""An hour of four performers at 60 Hz: nothing lost, memory flat, no tick too long."""
+"""Benchmark: an hour of four performers at 60 Hz; frames lost, memory growth, longest tick."""
 
 from __future__ import annotations
 
 import tempfile
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 
 from devices.builtin.gestures import RATE
 from devices.builtin.motions import motion_clip
-from devices.builtin.simulator import Simulator
+from devices.builtin.simulator import BACKLOG_SECONDS, Simulator
 from devices.skeleton import SkeletonFrame
 from replay.mcap.reader import McapReader
 from replay.recorded_stream import Keep, RecordedStream
@@ -30,31 +31,31 @@ from runtime.render.camera import front_camera
 from runtime.show.clock import Ticker
 from runtime.show.collector_pauses import objects_frozen
 from runtime.show.loop import FrameLoop
-from runtime.show.pacing import AtOnce, SpareTime
+from runtime.show.pacing import Pace, SpareTime
 from runtime.show.warn import warn
 
 HOUR = 3600.0  # [s]
 PERFORMERS = 4
 CHARACTER = "trex"
-WARM_UP = 0.2  # of the show
+WARM_UP = 0.2  # share of the show before memory is compared
 MOST_WARM_UP = 300.0  # [s]
-TICKS_A_SAMPLE = 60  # of the memory
+TICKS_A_SAMPLE = 60  # ticks from one look at the memory to the next
 MOST_GROWTH = 0.01
 LONGEST_TICK = 0.05  # [s]
-WAITING_ACCELERATED = 256  # frames for the disk, where the show waits for it as well
+WAITING_ACCELERATED = 256  # frames queued for the disk when the show waits for the disk
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Soak:
-    """What came of it.
+    """The measurements of one run.
 
     Attributes:
-        sent: frames that came.
+        sent: frames that arrived.
         kept: frames that the recording gives back, in order.
-        ticks: (T,) [s] how long each took.
-        work: (T,) [s] for how long of that the loop had a core: the rest, it waited for one.
-        stolen: (T,) [s] for how long the machine's host kept its cores to itself since the tick
-            before, of all cores together.
+        ticks: (T,) [s] the duration of each tick.
+        work: (T,) [s] the part of it in which the loop had a core; otherwise it waited for one.
+        stolen: (T,) [s] the time since the tick before in which a virtual machine's host withheld
+            its cores, summed over all cores.
         memory: (S,) resident memory [bytes], once a second of the show.
     """
 
@@ -67,54 +68,57 @@ class Soak:
 
     @property
     def warm(self) -> int:
-        """Seconds of the show after which memory counts."""
+        """The second of the show from which on memory counts."""
         return int(min(WARM_UP * len(self.memory), MOST_WARM_UP))
 
     @property
     def slow(self) -> NDArray[np.bool_]:
-        """Which ticks (T,) took too long."""
+        """The ticks (T,) that took too long."""
         slow: NDArray[np.bool_] = self.ticks > LONGEST_TICK
         return slow
 
     @property
     def stalled(self) -> NDArray[np.bool_]:
-        """Which of those (T,) the host took cores in; it is counted once it gives them back."""
+        """The slow ticks (T,) with stolen time in them or in the next: it is counted late."""
         counted_later = np.append(self.stolen[1:], 0.0)
         stalled: NDArray[np.bool_] = self.slow & (self.stolen + counted_later >= 0.99 * JIFFY)
         return stalled
 
     @property
     def growth(self) -> float:
-        """By what part the memory was larger, at most, than when it was warm."""
+        """By which share the memory grew, at most, after the warm-up."""
         return float(self.memory[self.warm :].max() / self.memory[self.warm] - 1.0)
 
 
 def run(*, seconds: float = HOUR, real_time: bool = False) -> dict[str, object]:
-    """Perform and record for so many seconds [s] of show; print and return what came of it.
+    """Perform and record for `seconds` [s] of show; print and return the measurements.
 
-    In real time, or as fast as it goes: then the clock goes on by a sixtieth of a second a tick.
+    The show runs in real time, or as fast as possible with a clock that advances by a sixtieth of a
+    second a tick.
     """
-    pace = "in real time" if real_time else "as fast as it goes"
+    tempo = "in real time" if real_time else "as fast as possible"
     print(
-        f"soak: {PERFORMERS} performers, {RATE:.0f} Hz, {seconds:.0f} s of show {pace}", flush=True
+        f"soak: {PERFORMERS} performers, {RATE:.0f} Hz, {seconds:.0f} s of show {tempo}", flush=True
     )
     with tempfile.TemporaryDirectory() as folder:
-        soak = soaked(Path(folder) / "soak.mcap", seconds, real_time=real_time)
+        soak = soaked(
+            Path(folder) / "soak.mcap", seconds, Tempo.real() if real_time else Tempo.accelerated()
+        )
     p50, p99, most = (1e3 * float(q) for q in np.percentile(soak.ticks, (50, 99, 100)))
     slow, stalled = int(soak.slow.sum()), int(soak.stalled.sum())
     worked = 1e3 * float(soak.work.max())
     lost, resident = soak.sent - soak.kept, float(soak.memory[-1]) / 2**20
-    print(f"  frames    {soak.sent} came, {lost} lost in the recording")
+    print(f"  frames    {soak.sent} arrived, {lost} lost in the recording")
     print(
         f"  memory    {resident:.1f} MiB at the end, {100 * soak.growth:+.2f} % at most "
         f"since {soak.warm} s (budget {100 * MOST_GROWTH:.0f} %)"
     )
     print(
         f"  ticks     {len(soak.ticks)}: {p50:.2f} ms median, {p99:.2f} ms p99, {most:.2f} ms at "
-        f"most, {slow} over {1e3 * LONGEST_TICK:.0f} ms, {stalled} of them where this machine's "
-        "host took its cores"
+        f"most; {slow} over {1e3 * LONGEST_TICK:.0f} ms, in {stalled} of them this machine's "
+        "host withheld its cores"
     )
-    print(f"  work      {worked:.2f} ms of a core at most in a tick; beyond that it waited for one")
+    print(f"  work      {worked:.2f} ms of a core at most in a tick; the rest it waited for a core")
     return {
         "real_time": real_time,
         "seconds": seconds,
@@ -127,25 +131,71 @@ def run(*, seconds: float = HOUR, real_time: bool = False) -> dict[str, object]:
     }
 
 
-def soaked(path: Path, seconds: float, *, real_time: bool) -> Soak:
-    """Perform for so long [s] while everything is recorded to `path`, and read that back."""
-    ticks = max(int(seconds * RATE), 1)
-    clock = _ShowClock()
-    stream = Simulator(
-        motion_clip("show"), time.perf_counter if real_time else clock, performers=PERFORMERS
-    )
-    # Filled, not only claimed, so that their own memory does not grow.
-    spent, work, stolen = np.full((3, ticks), np.nan, np.float32)
-    memory = np.full((ticks - 1) // TICKS_A_SAMPLE + 1, np.nan)
-    waiting = WAITING if real_time else WAITING_ACCELERATED
+@dataclass(frozen=True, slots=True)
+class Tempo:
+    """How the time of a show passes.
+
+    Attributes:
+        clock: the show's time [s].
+        pace: waits from tick to tick.
+        waits_for_disk: whether the show waits until a frame is queued for the disk; otherwise the
+            recorder drops frames when its queue is full.
+    """
+
+    clock: Callable[[], float]
+    pace: Pace
+    waits_for_disk: bool
+
+    @classmethod
+    def real(cls) -> Tempo:
+        """Real time."""
+        return cls(time.perf_counter, Ticker(RATE), waits_for_disk=False)
+
+    @classmethod
+    def accelerated(cls) -> Tempo:
+        """A sixtieth of a second a tick, however long the tick takes."""
+        steps = Steps(1.0 / RATE)
+        return cls(steps, steps, waits_for_disk=True)
+
+
+class Steps:
+    """A clock [s] that advances by a fixed step when a tick waits for the next one."""
+
+    def __init__(self, step: float) -> None:
+        self._step = step
+        self._count = 0
+
+    def __call__(self) -> float:
+        """Return the time [s]."""
+        return self._count * self._step
+
+    def wait(self) -> None:
+        """Advance by one step."""
+        self._count += 1
+
+    def is_due(self) -> bool:
+        """Return False: each tick has all the time that it takes."""
+        return False
+
+
+def soaked(path: Path, seconds: float, tempo: Tempo) -> Soak:
+    """Perform for `seconds` [s] of show, record everything to `path`, and read that back."""
+    stream = Simulator(motion_clip("show"), tempo.clock, performers=PERFORMERS)
+    most = int(seconds * RATE) + 2
+    # Filled now, so that their own memory does not grow during the show.
+    spent, work, stolen = np.full((3, most), np.nan, np.float32)
+    memory = np.full((most - 1) // TICKS_A_SAMPLE + 1, np.nan)
+    waiting = WAITING_ACCELERATED if tempo.waits_for_disk else WAITING
     with Recorder(path, stream.skeleton, tell=warn, waiting=waiting) as recorder:
-        log = _Log(recorder.offer if real_time else recorder.write, 2 * ticks * PERFORMERS)
+        frames = most + int(BACKLOG_SECONDS * RATE)  # the last poll may be late
+        keep = recorder.write if tempo.waits_for_disk else recorder.offer
+        log = _Log(keep, frames * PERFORMERS)
         loop = _loop(RecordedStream(stream, log.note))
-        pace = Ticker(RATE) if real_time else AtOnce()
-        spare = SpareTime(pace, loop)
+        spare = SpareTime(tempo.pace, loop)
+        tick, end = 0, tempo.clock() + seconds
         with objects_frozen():
             before = stolen_time()
-            for tick in range(ticks):
+            while tempo.clock() < end and tick < most:
                 began, worked = time.perf_counter(), time.thread_time()
                 loop.tick()
                 spare.spend()
@@ -155,13 +205,15 @@ def soaked(path: Path, seconds: float, *, real_time: bool) -> Soak:
                 stolen[tick], before = now - before, now
                 if tick % TICKS_A_SAMPLE == 0:
                     memory[tick // TICKS_A_SAMPLE] = resident_memory()
-                clock.now = (tick + 1) / RATE
-                pace.wait()
-    return Soak(log.count, log.found_in(path), spent, work, stolen, memory)
+                tick += 1
+                tempo.pace.wait()
+    samples = (tick - 1) // TICKS_A_SAMPLE + 1
+    found = log.found_in(path)
+    return Soak(log.count, found, spent[:tick], work[:tick], stolen[:tick], memory[:samples])
 
 
 def _loop(stream: RecordedStream) -> FrameLoop:
-    """A show of one character by whoever leads, without pictures."""
+    """Return a show of one character, driven by the first performer, without pictures."""
     performer = Performer(stream.skeleton)
     puppet = Puppet(builtin_character(CHARACTER))
     camera = front_camera()
@@ -180,17 +232,8 @@ def _loop(stream: RecordedStream) -> FrameLoop:
     )
 
 
-class _ShowClock:
-    """A clock [s] that stands until it is set."""
-
-    now = 0.0
-
-    def __call__(self) -> float:
-        return self.now
-
-
 class _Log:
-    """Notes who came when, on the way to the recorder."""
+    """Notes performer and time of each frame on its way to the recorder."""
 
     def __init__(self, keep: Keep, most: int) -> None:
         self.count = 0
@@ -198,13 +241,13 @@ class _Log:
         self._stamps = np.full((most, 2), np.nan)
 
     def note(self, frame: SkeletonFrame) -> None:
-        """Note one frame, and hand it on."""
+        """Note one frame and pass it on."""
         self._stamps[self.count] = frame.performer, frame.time
         self.count += 1
         self._keep(frame)
 
     def found_in(self, path: Path) -> int:
-        """How many of them a recording gives back, in the order in which they came."""
+        """Return how many of the noted frames a recording gives back, in order of arrival."""
         came = iter(self._stamps[: self.count].tolist())
         with McapReader(path) as reader:
             return sum([frame.performer, frame.time] in came for frame in reader.frames())

@@ -1,9 +1,9 @@
-"""How long it takes to carry whole trajectories over by examples.
+"""Benchmark: the retargeting of whole trajectories by examples.
 
-The paper times 3700 frames by 8 and by 12 examples, 73 and 161 s on its machine (Celikcan et al.
-2015, section 6); here they are of eight joints. Beside them in the same run: the paper's weights,
-of the four nearest examples, from a general sparse solver; and our paths with two feet held to the
-ground in turn.
+The paper retargets 3700 frames with 8 and with 12 examples in 73 and 161 s on its machine (Celikcan
+et al. 2015, section 6); here they have eight joints. The same run also measures the paper's weights
+of the four nearest examples with a general sparse solver, and our paths with two feet that stand on
+the ground in turn.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ JOINTS = 8
 PAPER = {8: 73.0, 12: 161.0}  # examples: seconds
 BUDGET = 0.15  # [s] with eight examples
 RUNS = 5
-_STEP = 40  # frames that a foot stands
+_STEP = 40  # frames for which a foot stands
 
 Array = NDArray[np.float64]
 
 
 def run(frames: int = FRAMES) -> dict[str, object]:
-    """Print a table and return it: seconds, the least of a few runs."""
+    """Print and return a table: seconds, the minimum of a few runs."""
     print(f"spacetime: {frames} frames of {JOINTS} joints; budget {1e3 * BUDGET:.0f} ms")
     print(f"{'examples':>8} {'ms':>8} {'held, ms':>9} {'general, ms':>12} {'paper, ms':>10}")
     rows = []
@@ -52,7 +52,7 @@ def run(frames: int = FRAMES) -> dict[str, object]:
 
 
 def _case(examples: int, frames: int) -> tuple[Array, Array, Array]:
-    """Examples (E, J, 3) of joints and control points, and a path (T, J, 3) among them."""
+    """Return examples (E, J, 3) of joints and of control points, and a path (T, J, 3)."""
     rng = np.random.default_rng(0)
     joints, controls = rng.normal(size=(2, examples, JOINTS, 3))
     time = np.arange(frames)[:, None, None] / 60.0
@@ -61,12 +61,12 @@ def _case(examples: int, frames: int) -> tuple[Array, Array, Array]:
 
 
 def _steps(frames: int) -> list[Constraint]:
-    """Two control points in turn stay on the ground, a constraint a frame."""
+    """Return one constraint a frame: two control points stand on the ground in turn."""
     return [held_at(frame, frame // _STEP % 2, (0.0,), axes=(1,)) for frame in range(frames)]
 
 
 def _general(joints: Array, controls: Array, path: Array) -> Array:
-    """Equations 16 to 21 as sparse products and a general solver; (J, T 4) weights."""
+    """Solve equations 16 to 21 with a general sparse solver; return weights (J, 4 T)."""
     frames = len(path)
     steps = sp.diags([1.0, -2.0, 1.0], [0, 1, 2], shape=(frames - 2, frames))
     smooth = ACCELERATION * sp.kron(steps, sp.eye(3), format="csr")
@@ -85,13 +85,13 @@ def _general(joints: Array, controls: Array, path: Array) -> Array:
 
 
 def _blocks(blocks: Array) -> sp.csr_matrix:
-    """A matrix with these (T, m, n) along its diagonal."""
+    """Return the matrix with these blocks (T, m, n) along its diagonal."""
     places = np.arange(len(blocks))
     return sp.csr_matrix(sp.bsr_matrix((blocks, places, np.arange(len(blocks) + 1))))
 
 
 def _least(run: Callable[[], Array]) -> float:
-    """The least time [s] of a few runs."""
+    """Return the minimum time [s] of a few runs."""
     times = []
     for _ in range(RUNS):
         began = perf_counter()

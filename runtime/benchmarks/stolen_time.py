@@ -1,17 +1,17 @@
-"""Time that a virtual machine's host took away from it."""
+"""The time in which a virtual machine's host withheld its processors (steal time)."""
 
 from __future__ import annotations
 
 import os
 from pathlib import Path
 
-JIFFY = 1.0 / os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 0.01  # [s] what is counted in
+JIFFY = 1.0 / os.sysconf("SC_CLK_TCK") if hasattr(os, "sysconf") else 0.01  # [s] its unit
 
 
 def stolen_time() -> float:
-    """For how long [s] processors with work to do have waited for the host since the start.
+    """Return the time [s] since the start in which processors had work but waited for the host.
 
-    The sum over all of them. Source: proc(5), `steal` of /proc/stat.
+    It is summed over all processors. Source: proc(5), `steal` of /proc/stat.
     """
     with Path("/proc/stat").open(encoding="ascii") as lines:
         return JIFFY * int(lines.readline().split()[8])

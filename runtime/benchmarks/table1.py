@@ -1,8 +1,8 @@
-"""Table 1 of Celikcan et al. 2015: frames a second on surfaces of the paper's sizes.
+"""Benchmark: table 1 of Celikcan et al. 2015, frames a second on surfaces of the paper's sizes.
 
-As the paper counts, a frame of rigid deformation is three iterations, and one of squash and stretch
-two iterations of the shape state and one of the pose state. Both are timed in turn, so that both
-see the same machine.
+As in the paper, a frame of rigid deformation has three iterations, and a frame of squash and
+stretch two iterations of the shape state and one of the pose state. Both are timed in turn, under
+the same load.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from runtime.benchmarks.torus import pulled_patch, torus
 from solvers.arap import ArapSolver
 from solvers.squash_stretch import SquashStretchSolver
 
-# The paper's model, its vertices, its frames a second with ARAP and with its own method, on four
-# cores of 2.6 GHz; and the frames a second that are asked of us.
+# The paper's model, its vertices, its frames a second with ARAP and with its own method on four
+# cores of 2.6 GHz, and our goal in frames a second.
 TABLE = (
     ("Cactus", 620, 86.1, 69.7, 2000),
     ("T-Rex", 5621, 9.0, 7.5, 400),
@@ -30,19 +30,19 @@ REPEATS = 101
 
 
 def run() -> dict[str, object]:
-    """Print the table beside the paper's and return it."""
+    """Print and return our table beside the paper's."""
     print(f"table 1: frames a second, {ITERATIONS} iterations a frame, {get_num_threads()} threads")
     print(
         f"{'model':<10} {'vertices':>8} {'ARAP':>7} {'paper':>6} {'squash':>7} {'paper':>6}"
-        f" {'asked':>6} {'squash/ARAP time':>17}"
+        f" {'goal':>6} {'squash/ARAP time':>17}"
     )
     rows = []
-    for model, vertices, paper_arap, paper_squash, asked in TABLE:
+    for model, vertices, paper_arap, paper_squash, goal in TABLE:
         row = _measure(vertices)
         rows.append({"model": model, "paper_arap": paper_arap, "paper_squash": paper_squash, **row})
         print(
             f"{model:<10} {row['vertices']:>8} {row['arap_fps']:7.0f} {paper_arap:6.1f}"
-            f" {row['squash_fps']:7.0f} {paper_squash:6.1f} {asked:6d} {row['ratio']:17.2f}",
+            f" {row['squash_fps']:7.0f} {paper_squash:6.1f} {goal:6d} {row['ratio']:17.2f}",
             flush=True,
         )
     return {"threads": get_num_threads(), "models": rows}

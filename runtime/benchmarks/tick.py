@@ -1,4 +1,4 @@
-"""How long a whole replay tick takes without the raster, stage by stage."""
+"""Benchmark: a whole tick of a replay without pictures, stage by stage."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ ITERATIONS = (1, 2, 3)
 def run() -> dict[str, object]:
     """Replay the built-in show on each built-in character; print and return the stage times [ms].
 
-    The first pass over the recording warms caches up and is not counted.
+    The first pass over the recording only warms caches.
     """
     print(f"tick: budget {BUDGET_MS['p50']} ms median, {BUDGET_MS['p99']} ms p99, 10k vertices")
     print(

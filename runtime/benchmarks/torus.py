@@ -1,4 +1,4 @@
-"""The surface that benchmarks deform: any number of vertices, all alike."""
+"""The surface that the benchmarks deform: a torus with any number of vertices."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Ints = NDArray[np.int64]
 
 
 def torus(count: int) -> tuple[Floats, Ints]:
-    """A torus of about `count` vertices with nearly equilateral triangles."""
+    """Return a torus of about `count` vertices with nearly equilateral triangles."""
     across = round((count * 0.35) ** 0.5)
     along = round(count / across)
     u, v = np.meshgrid(np.arange(along), np.arange(across), indexing="ij")
@@ -26,7 +26,7 @@ def torus(count: int) -> tuple[Floats, Ints]:
 
 
 def pulled_patch(vertices: Floats) -> tuple[Ints, Floats]:
-    """Two opposite patches of 1 % each as handles (H,), and targets (H, 3): one is pulled away."""
+    """Return two opposite patches of 1 % as handles (H,), and targets (H, 3) that move one away."""
     order = np.argsort(vertices[:, 0], kind="stable")
     patch = max(1, len(vertices) // 100)
     handles = np.concatenate([order[:patch], order[-patch:]])

@@ -1,4 +1,4 @@
-"""A bird of two bulbs: a body to squash, and a tail that should not mind (the paper's figure 6)."""
+"""A bird with a body to squash and a tail that should keep its volume (the paper's figure 6)."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from runtime.figures.revolved import revolved
 from solvers.linear.laplacian import Floats
 
 BIRD = "bird"
-_TAIL = 0.80  # metres from the middle: where the tail begins
+_TAIL = 0.80  # [m] the x at which the tail begins
 _COLOUR = (0.16, 0.42, 0.62, 1.0)
 
 
 def bird() -> Character:
-    """The bird at rest, beak to the left, two metres long."""
+    """Return the bird at rest, beak to the left, two metres long."""
     x = np.linspace(-0.6, 1.4, 90)[1:-1]
     body = 0.34 * np.exp(-(((x + 0.05) / 0.44) ** 4))
     tail = 0.20 * np.exp(-(((x - 1.08) / 0.22) ** 4))
@@ -37,12 +37,12 @@ def bird() -> Character:
 
 
 def tail_volume(vertices: Floats, character: Character) -> float:
-    """The volume of the bird's tail at these vertices (N, 3), with a cone over where it begins."""
+    """Return the volume of the bird's tail for vertices (N, 3); a cone closes its open end."""
     is_tail = character.vertices[character.faces, 0].min(axis=1) > _TAIL
     faces = character.faces[is_tail]
     tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     count = len(vertices)
     is_open = ~np.isin(tails * count + heads, heads * count + tails)
     apex = vertices[tails[is_open]].mean(axis=0)
-    # A cone whose apex is the origin of the sum has no volume of its own.
+    # `volume` sums from the first vertex, so a cone with its apex there adds nothing.
     return volume(np.vstack([apex, vertices]), faces + 1)

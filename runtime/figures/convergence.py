@@ -1,4 +1,4 @@
-"""How fast energies fall: ours and the plain equations from a cold start, drawn as curves."""
+"""Convergence from a cold start: the energies of our solvers and of the plain equations."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from solvers.squash_stretch import SquashStretchSolver
 FRAMES = 60
 SHARES = (0.30, 0.20, 0.10, 0.05)
 
-_FINER = 2  # drawn this much larger, for smooth edges
-_SETTLED = 150  # iterations after which the plain equations count as settled
+_FINER = 2  # supersampling, for smooth edges
+_SETTLED = 150  # iterations after which the plain equations count as converged
 _INK, _PAPER, _GRID = (58, 48, 40), (250, 246, 238), (226, 218, 204)
 _COLOURS = {
     "ARAP, plain": (196, 178, 150),
@@ -31,23 +31,23 @@ _COLOURS = {
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Curves:
-    """One constraint: what its energies are after each iteration, by method, as shares (K,).
+    """The energies after each iteration under one constraint, as shares (K,) by method.
 
-    One is the energy of the cold start, zero the lowest that either of the two methods with the
-    same energy comes to.
+    1 is the energy of the cold start, 0 the lowest energy that either of the two methods with the
+    same energy reaches.
     """
 
     name: str
     shares: dict[str, Floats]
 
     def iterations_to(self, method: str, share: float) -> int | None:
-        """How many iterations it takes to come down to a share; None for more than there are."""
+        """Return the number of iterations to a share; None if it is not reached."""
         below = np.flatnonzero(self.shares[method] <= share)
         return int(below[0]) if len(below) else None
 
 
 def measure() -> list[Curves]:
-    """The curves of four constraints on a round bar with patches at both ends."""
+    """Return the curves of four constraints on a round bar with handles at both ends."""
     vertices, faces = revolved(np.linspace(0.0, 4.0, 32), np.full(32, 0.5), 14)
     x = vertices[:, 0]
     handles = np.flatnonzero((x < 0.3) | (x > 3.7))
@@ -77,7 +77,7 @@ def _curves(name: str, vertices: Floats, faces: Ints, handles: Ints, targets: Fl
         ("squash and stretch", scaled, 2, plain.scaled_step, plain.scaled_energy),
     ):
         slow = _plain_energies(plain.cold_start(targets), step, energy)
-        # Two iterations of ours are one of the shape state, whose energy this is, and the pose.
+        # Two iterations of ours are one of the shape state, which has this energy, and one pose.
         ours.solve(targets, 0)
         fast = [ours.energy]
         for _ in range(FRAMES):
@@ -102,7 +102,7 @@ def _plain_energies(
 
 
 def draw(curves: list[Curves], size: tuple[int, int]) -> Image.Image:
-    """The curves as a picture: a panel for each constraint, two to a row, a legend below."""
+    """Draw the curves: a panel for each constraint, two in a row, and a legend below."""
     width, height = _FINER * size[0], _FINER * size[1]
     picture = Image.new("RGB", (width, height), _PAPER)
     pen = ImageDraw.Draw(picture)
@@ -132,7 +132,7 @@ def _draw_panel(pen: ImageDraw.ImageDraw, curve: Curves, box: tuple[int, int, in
     for share in (1.0, *SHARES):
         height = at(0, share)[1]
         pen.line([(left, height), (right, height)], fill=_GRID, width=_FINER)
-        if share != SHARES[-1]:  # too near to the one above
+        if share != SHARES[-1]:  # too close to the one above
             text = f"{share:.0%}"
             pen.text((left - pad // 4, height), text, fill=_INK, font=font, anchor="rm")
     for iteration in range(0, FRAMES + 1, 20):
@@ -151,13 +151,13 @@ def _draw_panel(pen: ImageDraw.ImageDraw, curve: Curves, box: tuple[int, int, in
 def _stroke(
     pen: ImageDraw.ImageDraw, points: list[tuple[float, float]], method: str, width: int
 ) -> None:
-    """A line in a method's colour; the plain ones are wider, to be seen under ours."""
+    """Draw a line in a method's colour; the plain methods are wider, to show under ours."""
     wide = max(width, 2) * (2 if method.endswith("plain") else 1)
     pen.line(points, fill=_COLOURS[method], width=wide, joint="curve")
 
 
 def table(curves: list[Curves]) -> list[str]:
-    """Lines of text: the iterations that each method takes to each share."""
+    """Return lines of text: the iterations of each method to each share."""
     heads = "".join(f"{f'{share:.0%}':>6}" for share in SHARES)
     lines = [f"{'iterations to':34}{heads}"]
     for curve in curves:

@@ -1,4 +1,4 @@
-"""Deformed characters side by side on the stage, each with a name at its feet."""
+"""Draw deformed characters side by side on a stage, with captions."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from runtime.render.context import headless_context, release_headless
 from runtime.render.stage import Stage
 from solvers.linear.laplacian import Floats, Ints
 
-_GAP = 0.16  # metres between two of a row
+_GAP = 0.16  # [m] between two characters of a row
 _HANDLE_COLOUR = (0.05, 0.5, 0.12, 1.0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Exhibit:
-    """A character with its vertices (N, 3) [m] elsewhere, and what is written at its feet.
+    """A character with deformed vertices (N, 3) [m] and a caption.
 
-    `handles` (H,) are painted green, as in the paper's figures.
+    Its `handles` (H,) are painted green, as in the paper's figures.
     """
 
     character: Character
@@ -32,7 +32,7 @@ class Exhibit:
     caption: str
 
     def as_character(self) -> Character:
-        """The character as it is shown: this pose is its rest pose."""
+        """Return the character with this pose as its rest pose."""
         surface = self.character.surface
         colours = surface.colors.copy()
         colours[np.isin(surface.vertex, self.handles)] = _HANDLE_COLOUR
@@ -42,10 +42,10 @@ class Exhibit:
 
 
 class Gallery:
-    """Draws rows of exhibits without a window; to be used in a `with` statement.
+    """Draws rows of exhibits without a window; a context manager.
 
     Raises:
-        InputError: nothing can be drawn here.
+        InputError: there is no OpenGL without a window.
     """
 
     def __init__(self, size: tuple[int, int]) -> None:
@@ -64,7 +64,7 @@ class Gallery:
         release_headless(self._context)
 
     def row(self, exhibits: Sequence[Exhibit]) -> NDArray[np.uint8]:
-        """A picture (H, W, 4) of exhibits in a row, on one floor and at one scale."""
+        """Draw exhibits in a row, on one floor and at one scale, into a picture (H, W, 4)."""
         stage = Stage(self._context, self._size)
         try:
             right = 0.0

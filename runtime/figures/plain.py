@@ -1,6 +1,6 @@
-"""The equations as the papers write them, in NumPy: no warm start, no fused kernels, no pressure.
+"""The papers' equations in plain NumPy, without warm start, fused kernels or pressure.
 
-What our solvers are compared with in the figures: as-rigid-as-possible deformation (Sorkine and
+The figures compare our solvers with them: as-rigid-as-possible deformation (Sorkine and
 Alexa 2007), the scaled-shape state (Celikcan et al. 2015, eqs. (4) to (9)), and deformation under
 one constraint on the whole volume (in the manner of Huang et al. 2006, Subspace gradient domain
 mesh deformation, section 3; in the full space, with the one multiplier found along its gradient).
@@ -17,7 +17,7 @@ from solvers.linear.laplacian import Floats, Ints, cotangent_edges, graph_laplac
 
 
 class PlainSolver:
-    """One surface, vertices (N, 3) and faces (F, 3), held at handles (H,)."""
+    """Solves for one surface: vertices (N, 3), faces (F, 3), and handles (H,) at their targets."""
 
     def __init__(self, vertices: Floats, faces: Ints, handles: Ints) -> None:
         edges = cotangent_edges(vertices, faces)
@@ -30,7 +30,7 @@ class PlainSolver:
         slots = np.arange(len(self._tails))
         self._sum = sp.csr_matrix((np.ones(len(slots)), (self._tails, slots)), (count, len(slots)))
         laplacian = graph_laplacian(edges, count)
-        # A component without a handle is nobody's to move, and stays at rest.
+        # A component without a handle stays at rest.
         _, part_of = connected_components(laplacian, directed=False)
         is_free = np.isin(part_of, part_of[handles])
         is_free[handles] = False
@@ -40,7 +40,7 @@ class PlainSolver:
         self._volume = volume(vertices, faces)
 
     def cold_start(self, targets: Floats) -> Floats:
-        """The first guess for handles at their targets (H, 3): no cell is turned.
+        """Return the first guess for handles at their targets (H, 3), without rotations.
 
         Source: Celikcan et al. 2015, eq. (3); Lipman et al. 2004.
         """
@@ -49,16 +49,16 @@ class PlainSolver:
         return self._surface(x, np.tile(np.eye(3), (len(x), 1, 1)))
 
     def rigid_step(self, x: Floats) -> Floats:
-        """A local and a global step. Sorkine and Alexa 2007, eqs. (6) and (9)."""
+        """Do a local and a global step. Sorkine and Alexa 2007, eqs. (6) and (9)."""
         return self._surface(x, self._rotations(x))
 
     def scaled_step(self, x: Floats) -> Floats:
-        """A local and a global step of the scaled-shape state. Celikcan et al. 2015, eqs. (5-9)."""
+        """Do a local and a global step of the shape state. Celikcan et al. 2015, eqs. (5-9)."""
         R = self._rotations(x)
         return self._surface(x, self._scales(x, R)[:, None, None] * R)
 
     def whole_volume_step(self, x: Floats) -> Floats:
-        """A local and a global step under one hard constraint: the whole volume stays.
+        """Do a local and a global step under one hard constraint: the whole volume is kept.
 
         The stationary point of the energy plus a multiplier times the volume lies along L^-1 times
         the volume's gradient; Newton's method finds the multiplier.
@@ -76,11 +76,11 @@ class PlainSolver:
         return x + multiplier * push
 
     def rigid_energy(self, x: Floats) -> float:
-        """Sorkine and Alexa 2007, eq. (7), under the best rotations."""
+        """Return the energy with the best rotations. Sorkine and Alexa 2007, eq. (7)."""
         return self._energy(x, self._rotations(x))
 
     def scaled_energy(self, x: Floats) -> float:
-        """Celikcan et al. 2015, eq. (4), under the best rotations and scales."""
+        """Return the energy with the best rotations and scales. Celikcan et al. 2015, eq. (4)."""
         R = self._rotations(x)
         return self._energy(x, self._scales(x, R)[:, None, None] * R)
 
@@ -118,13 +118,13 @@ class PlainSolver:
 
 
 def volume(vertices: Floats, faces: Ints) -> float:
-    """The volume that a closed surface (N, 3), (F, 3) encloses."""
+    """Return the volume inside a closed surface: vertices (N, 3), faces (F, 3)."""
     a, b, c = (vertices[faces[:, corner]] - vertices[0] for corner in range(3))
     return float(np.einsum("fi,fi->", a, np.cross(b, c))) / 6.0
 
 
 def volume_gradient(vertices: Floats, faces: Ints) -> Floats:
-    """How the volume changes with each vertex, (N, 3)."""
+    """Return the gradient (N, 3) of the volume with respect to each vertex."""
     gradient = np.zeros_like(vertices)
     corners = [vertices[faces[:, corner]] - vertices[0] for corner in range(3)]
     for corner in range(3):

@@ -1,4 +1,4 @@
-"""What is asked of a character in the figures: where patches at its foot and its top go."""
+"""The poses of the figures: handles at a character's foot and top, and their targets."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from solvers.arap import ArapSolver
 from solvers.linear.laplacian import Floats, Ints
 
 _PATCH = 0.1  # of the height, at the foot and at the top
-_ITERATIONS = 3  # a frame, as the paper counts
+_ITERATIONS = 3  # a frame, as in the paper
 _FRAMES, _WAIT = 24, 24
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Press:
-    """Two patches of handles (H,), and which of them are the upper one's."""
+    """Handles (H,) at the foot (group 0) and at the top (group 1) of a character."""
 
     rest: Floats
     handles: Ints
@@ -27,10 +27,10 @@ class Press:
 
     @classmethod
     def on(cls, character: Character) -> Press:
-        """The patches of a character.
+        """Choose the handles of a character.
 
         Raises:
-            InputError: it is too flat, or too coarse, to have a foot and a top.
+            InputError: the character is too flat or too coarse to have a foot and a top.
         """
         height = character.vertices[:, 1]
         low, high = float(height.min()), float(height.max())
@@ -45,7 +45,7 @@ class Press:
         return cls(character.vertices, handles, groups)
 
     def targets(self, ratio: float, lean: float) -> Floats:
-        """The handles (H, 3) [m], the upper ones at `ratio` of their height, leaning [rad]."""
+        """Return targets (H, 3) [m]: the top at `ratio` of its height, leaning by `lean` [rad]."""
         targets = self.rest[self.handles].copy()
         upper = self.groups == 1
         foot = self.rest[self.handles[~upper]].mean(axis=0)
@@ -57,7 +57,7 @@ class Press:
 
 
 def perform(solver: ArapSolver, press: Press, ratio: float, lean: float) -> Floats:
-    """The vertices (N, 3) [m] after a way there in frames, as a performance would go it."""
+    """Move the handles to the pose in frames, as in a performance; return vertices (N, 3) [m]."""
     for share in [*np.linspace(0.0, 1.0, _FRAMES), *np.ones(_WAIT)]:
         targets = press.targets(1.0 + share * (ratio - 1.0), share * lean)
         answer = solver.solve(targets, _ITERATIONS)

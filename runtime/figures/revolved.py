@@ -8,9 +8,9 @@ from solvers.linear.laplacian import Floats, Ints
 
 
 def revolved(x: Floats, radii: Floats, around: int) -> tuple[Floats, Ints]:
-    """A closed surface about the x axis: rings at x (R,) of radii (R,), and a pole at each end.
+    """Return a closed surface about the x axis: rings at x (R,) of radii (R,), a pole at each end.
 
-    Every other ring is turned by half a step. Vertices (R * around + 2, 3) and faces, facing out.
+    Every other ring is turned by half a step. It has R * around + 2 vertices; faces face outward.
     """
     rings = len(x)
     angle = 2 * np.pi * (np.arange(around) + 0.5 * (np.arange(rings)[:, None] % 2)) / around

@@ -6,7 +6,7 @@ import moderngl
 import numpy as np
 import pytest
 
-from runtime.benchmarks.latency import WARM_UP, WAYS, measured
+from runtime.benchmarks.latency import WAYS, measured
 from runtime.cli import main
 
 
@@ -21,7 +21,6 @@ def test_stamps_follow_one_another(context: moderngl.Context, way: str) -> None:
     assert (times.uploaded < times.drawn).all()
     for stamps in (times.sent, times.came, times.uploaded, times.drawn):
         assert (np.diff(stamps) > 0.0).all()
-    assert times.came[-1] - times.came[0] <= seconds + 5.0 < WARM_UP + 10.0
 
 
 def test_load_is_for_latency(capsys: pytest.CaptureFixture[str]) -> None:
