@@ -70,12 +70,12 @@ def _by_bridge(played: MotionClip, closing: ExitStack) -> Send:
 
 def _by_vmc(played: MotionClip, port: int, closing: ExitStack) -> Send:
     performer = Performer(played.skeleton)
-    sender = closing.enter_context(VmcPerformer(performer, "127.0.0.1", port))
+    sender = closing.enter_context(VmcPerformer(played.skeleton, "127.0.0.1", port))
     print("ready", flush=True)
 
     def send(frame: SkeletonFrame) -> None:
-        performer.follow(frame)
-        sender.write(PerformedFrame(0, frame.time, _NOTHING, None))
+        pose = performer.follow(frame)
+        sender.write(PerformedFrame(0, frame.time, _NOTHING, None, (pose,)))
 
     return send
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.errors import InputError
+from runtime.driving.performer import Pose
 from runtime.driving.targets import PosedNodes
 
 
@@ -23,6 +24,8 @@ class PerformedFrame:
             them, since a later frame overwrites them.
         nodes: the K nodes of the character's skeleton, on the stage; None where the driver poses
             none.
+        poses: newest pose of each performer of the show, in the order of their slots; None for one
+            who has not come yet.
         picture: (H, W, 4) uint8 sRGB with straight alpha, top row first, or None when nobody needs
             one of this frame.
     """
@@ -31,6 +34,7 @@ class PerformedFrame:
     time: float
     vertices: NDArray[np.float64]
     nodes: PosedNodes | None
+    poses: tuple[Pose | None, ...] = ()
     picture: NDArray[np.uint8] | None = None
 
     def nodes_for(self, what: str) -> PosedNodes:

@@ -207,6 +207,7 @@ class FrameLoop:
         self.latency = self._clock() - frame.arrival
         if math.isfinite(self.latency):
             self._report.times.add("latency", self.latency)
+        poses = tuple(self._poses)
         with self._timer.stage("publish"):
             for motion, kept in zip(self._motions, self._outputs, strict=True):
                 performed = PerformedFrame(
@@ -214,6 +215,7 @@ class FrameLoop:
                     time=at,
                     vertices=motion.vertices,
                     nodes=motion.nodes,
+                    poses=poses,
                     picture=picture,
                 )
                 for output in kept:

@@ -100,10 +100,10 @@ def open_outputs(
         outputs[0].append(closing.enter_context(broadcast))
     if options.publish is not None:
         publisher = open_publisher(_publishing(options), performers[0].skeleton)
-        outputs[0].append(closing.enter_context(BridgePerformer(performers, publisher)))
+        outputs[0].append(closing.enter_context(BridgePerformer(publisher)))
     if options.vmc is not None:
         host, port = options.vmc
-        lead = VmcPerformer(performers[0], host, port or VMC_PORT)
+        lead = VmcPerformer(performers[0].skeleton, host, port or VMC_PORT)
         outputs[0].append(closing.enter_context(lead))
     return outputs
 

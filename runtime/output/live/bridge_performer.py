@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Self
 
 import numpy as np
 
 from devices.skeleton import SkeletonFrame
-from runtime.driving.performer import Performer, Pose
+from runtime.driving.performer import Pose
 from runtime.output.live.bridge_publisher import BridgePublisher
 from runtime.output.output import PerformedFrame
 
@@ -23,9 +24,7 @@ class BridgePerformer:
     """An output that publishes each pose of each performer, whatever characters follow them.
 
     Args:
-        performers: whose poses they are, put in order and without gaps; all of one skeleton. Each
-            pose goes under its performer's number.
-        publisher: is closed with this.
+        publisher: sends each pose under its performer's number; it is closed with this.
         clock: host monotonic time [s]; a show that is not on it, as fast as it can, is moved there.
     """
 
@@ -33,22 +32,19 @@ class BridgePerformer:
 
     def __init__(
         self,
-        performers: Sequence[Performer],
         publisher: BridgePublisher,
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
-        self._performers = performers
         self._publisher = publisher
         self._clock = clock
         self._shift = math.nan
-        self._last: list[Pose | None] = [None] * len(performers)
+        self._last: tuple[Pose | None, ...] = ()
 
     def write(self, frame: PerformedFrame) -> None:
         """Publish the poses that are others than at the last frame, the oldest first."""
-        poses = [performer.pose for performer in self._performers]
-        pairs = zip(poses, self._last, strict=True)
+        pairs = itertools.zip_longest(frame.poses, self._last)
         fresh = [pose for pose, last in pairs if pose is not None and pose is not last]
-        self._last = poses
+        self._last = frame.poses
         now = self._clock()
         if fresh and math.isnan(self._shift):
             away = now - frame.time

@@ -13,7 +13,7 @@ from typing import Self
 from devices.bodies.unity_space import across_unity, turn_across_unity
 from devices.errors import InputError
 from devices.osc.messages import write_bundles, write_message
-from runtime.driving.performer import Performer
+from devices.skeleton import Skeleton
 from runtime.output.live.humanoid_bones import HumanoidBones
 from runtime.output.output import PerformedFrame
 
@@ -25,13 +25,13 @@ _UNMOVED = (0.0,) * 6 + (1.0,)
 
 
 class VmcPerformer:
-    """An output that sends the performer's newest pose as VMC, whatever character follows it.
+    """An output that sends the first performer's newest pose as VMC, whatever character follows it.
 
     A datagram that cannot be sent is gone, as UDP has it, and counted; a show never waits for
     who listens.
 
     Args:
-        performer: whose pose it is; the protocol knows one at a port.
+        skeleton: of the performer; the protocol knows one performer at a port.
         host, port: where the marionette listens.
 
     Attributes:
@@ -43,10 +43,9 @@ class VmcPerformer:
 
     pictures_a_second = 0.0
 
-    def __init__(self, performer: Performer, host: str, port: int = PORT) -> None:
+    def __init__(self, skeleton: Skeleton, host: str, port: int = PORT) -> None:
         self.lost = 0
-        self._performer = performer
-        self._bones = HumanoidBones(performer.skeleton)
+        self._bones = HumanoidBones(skeleton)
         self._heads = [
             write_message("/VMC/Ext/Bone/Pos", _POSE, name, *_UNMOVED)[:-28]
             for name in self._bones.names
@@ -56,8 +55,8 @@ class VmcPerformer:
         self._socket, self._target = _socket_to(host, port)
 
     def write(self, frame: PerformedFrame) -> None:
-        """Send the performer's pose at this frame."""
-        pose = self._performer.pose
+        """Send the pose of the first performer at this frame."""
+        pose = frame.poses[0]
         if pose is None:
             return
         self._began = frame.time if self._began is None else self._began

@@ -40,9 +40,9 @@ def publisher() -> Iterator[BridgePublisher]:
         yield opened
 
 
-def performed(at: float) -> PerformedFrame:
-    none = np.zeros((0, 3))
-    return PerformedFrame(0, at, none, None)
+def performed(at: float, performers: Sequence[Performer]) -> PerformedFrame:
+    poses = tuple(performer.pose for performer in performers)
+    return PerformedFrame(0, at, np.zeros((0, 3)), nodes=None, poses=poses)
 
 
 def heard(stream: BridgeStream, count: int) -> list[SkeletonFrame]:
@@ -58,20 +58,20 @@ def test_what_is_new_goes_out_once_the_oldest_first(publisher: BridgePublisher) 
     """Whoever has no new pose is not told of again, and who takes over a part has a new number."""
     lead, other, nobody = performers = [Performer(BODY) for _ in range(3)]
     with (
-        BridgePerformer(performers, publisher, clock=lambda: 50.0) as output,
+        BridgePerformer(publisher, clock=lambda: 50.0) as output,
         BridgeStream(Bridge(publisher.endpoint, LOSSLESS)) as stream,
     ):
-        output.write(performed(9.0))  # nobody has come
+        output.write(performed(9.0, performers))  # nobody has come
         lead.follow(frame(pose(), 10.02, performer=4))
         other.follow(frame(pose(T_POSE), 10.01, performer=9))
-        output.write(performed(10.02))
+        output.write(performed(10.02, performers))
         hidden = pose()
         hidden[3] = np.nan
         other.follow(frame(hidden, 10.04, performer=9))
-        output.write(performed(10.04))
-        output.write(performed(10.05))
+        output.write(performed(10.04, performers))
+        output.write(performed(10.05, performers))
         other.follow(frame(pose(), 10.06, performer=2))
-        output.write(performed(10.06))
+        output.write(performed(10.06, performers))
         frames = heard(stream, 4)
         assert stream.traffic.dropped == 0
     assert nobody.pose is None
@@ -118,7 +118,7 @@ def test_a_second_stage_has_both_performers_as_the_first_has_them(
     stream = Simulator(motion_clip("wave"), lambda: now[0], performers=2)
     acts = two_acts(for_live())
     performers = [act.performer for act in acts]
-    output = BridgePerformer(performers, publisher, clock=lambda: now[0])
+    output = BridgePerformer(publisher, clock=lambda: now[0])
     loop = loop_over(stream, acts, [[output], []])
     poses: list[Pose] = []
     with output, BridgeStream(Bridge(publisher.endpoint, LOSSLESS)) as bridge:

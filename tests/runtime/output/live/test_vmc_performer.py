@@ -40,9 +40,10 @@ def marionette() -> Iterator[socket.socket]:
         yield listening
 
 
-def performed(index: int) -> PerformedFrame:
-    none = np.zeros((0, 3))
-    return PerformedFrame(index, 70.0 + index / 60, none, None)
+def performed(index: int, performer: Performer) -> PerformedFrame:
+    return PerformedFrame(
+        index, 70.0 + index / 60, np.zeros((0, 3)), nodes=None, poses=(performer.pose,)
+    )
 
 
 def seen(positions: np.ndarray, index: int) -> SkeletonFrame:
@@ -65,12 +66,12 @@ def test_what_is_sent_is_what_is_received(marionette: socket.socket) -> None:
     decoder = VmcDecoder()
     wanted: list[np.ndarray] = []
     found: list[SkeletonFrame] = []
-    with VmcPerformer(performer, *marionette.getsockname()) as output:
+    with VmcPerformer(performer.skeleton, *marionette.getsockname()) as output:
         for index in range(0, 400, 7):
             performer.follow(seen(act.positions[index], index))
             assert performer.pose is not None
             wanted.append(performer.pose.seen[bones.joints])
-            output.write(performed(index))
+            output.write(performed(index, performer))
             came = datagrams(marionette)
             assert max(len(one) for one in came) <= LONGEST
             found += [f for one in came for f in decoder.feed(one, 10.0 + index / 60)]
@@ -90,10 +91,10 @@ def test_what_is_sent_is_what_is_received(marionette: socket.socket) -> None:
 def test_python_osc_reads_the_order_of_the_specification(marionette: socket.socket) -> None:
     act = motion_clip("show")
     performer = Performer(act.skeleton)
-    with VmcPerformer(performer, *marionette.getsockname()) as output:
-        output.write(performed(0))  # nobody to be seen yet: nothing is sent
+    with VmcPerformer(performer.skeleton, *marionette.getsockname()) as output:
+        output.write(performed(0, performer))  # nobody to be seen yet: nothing is sent
         performer.follow(seen(act.positions[0], 0))
-        output.write(performed(1))
+        output.write(performed(1, performer))
         messages = [m for one in datagrams(marionette) for m in OscBundle(one)]
     assert messages[0].address == "/VMC/Ext/Root/Pos"
     assert messages[0].params == ["root", 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0]
@@ -188,7 +189,7 @@ def test_hands_alone_are_refused_in_one_line() -> None:
         [f"{side}_{name}" for side in ("left", "right") for name in HAND_LANDMARKS]
     )
     with pytest.raises(InputError, match="whole bodies") as refused:
-        VmcPerformer(Performer(hands), "127.0.0.1", 1)
+        VmcPerformer(hands, "127.0.0.1", 1)
     assert "\n" not in str(refused.value)
 
 
@@ -198,9 +199,9 @@ def test_nobody_listening_stops_no_show(marionette: socket.socket) -> None:
     performer.follow(seen(act.positions[0], 0))
     host, port = marionette.getsockname()
     marionette.close()
-    with VmcPerformer(performer, host, port) as output:
+    with VmcPerformer(performer.skeleton, host, port) as output:
         for index in range(20):
-            output.write(performed(index))
+            output.write(performed(index, performer))
     output.close()
     with pytest.raises(InputError, match="no host is called"):
-        VmcPerformer(performer, "no.such.host.invalid")
+        VmcPerformer(performer.skeleton, "no.such.host.invalid")
