@@ -1,4 +1,4 @@
-"""What the folders may know of each other, what a start may load, what a commit may hold."""
+"""The rules of the tree: imports, sizes of folders and files, docstrings, reasons, no paths."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ import re
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterable, Iterator
 from importlib import import_module
 from pathlib import Path
 from typing import get_type_hints
@@ -162,6 +163,23 @@ def test_an_adapter_is_the_protocol_and_nothing_more(scheme: str) -> None:
 
 def test_a_player_can_stand_in_for_a_device() -> None:
     assert methods_of_the_protocol() <= set(vars(Player))
+
+
+MOST_MODULES = 20  # in a folder, without its __init__.py
+
+
+def modules() -> list[Path]:
+    """Every Python file of the rooms and of the tests."""
+    return list(sources(*ROOMS, "tests"))
+
+
+def named(paths: Iterable[Path]) -> list[str]:
+    return [path.relative_to(CHECKOUT).as_posix() for path in paths]
+
+
+def test_no_folder_has_more_modules_than_one_can_look_through() -> None:
+    folders = Counter(path.parent for path in modules() if path.name != "__init__.py")
+    assert not named(folder for folder, count in folders.items() if count > MOST_MODULES)
 
 
 def tracked_text() -> Iterator[tuple[str, str]]:
