@@ -1,1 +1,1 @@
-"""Performers that arrive as OSC: VMC, VRChat trackers, NI mate and similar programs."""
+"""Devices that send Open Sound Control: VMC, VRChat trackers, NI mate and similar programs."""

@@ -1,8 +1,8 @@
-"""Packets that differ in their numbers only, as those of a sender do from frame to frame.
+"""Recognise OSC packets that differ from an earlier packet only in their numbers.
 
-Sizes, addresses, type tags and texts decide what an OSC packet holds. Where all of those are, byte
-for byte, as in a packet that was read strictly before, it has the same messages with other numbers,
-and need not be read again.
+Sizes, addresses, type tags and texts determine what an OSC packet contains. If all of these equal,
+byte for byte, those of a packet that was parsed strictly, the packet has the same messages with
+other numbers and need not be parsed again.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ _TIME_TAG = slice(8, 16)  # of the outer bundle
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Layout(Generic[Plan]):
-    """Bits (N,) that stay, those bits, and what the packet's reader made of them."""
+    """The bits (N,) that are constant, their values, and the plan that the decoder made."""
 
     mask: Bytes
     pattern: Bytes
@@ -37,15 +37,15 @@ class _Layout(Generic[Plan]):
 
 
 class Layouts(Generic[Plan]):
-    """The layouts of the packets of one sender, so many of them as a sender has in one frame."""
+    """The layouts of one sender's packets; it needs as many as a sender has packets per frame."""
 
     def __init__(self) -> None:
         self._by_length: dict[int, deque[_Layout[Plan]]] = {}
         nothing = np.zeros(0, dtype=np.uint8)
-        _same(np.frombuffer(b"", np.uint8), nothing, nothing)  # compiled before the first packet
+        _same(np.frombuffer(b"", np.uint8), nothing, nothing)  # compile before the first packet
 
     def find(self, data: bytes) -> Plan | None:
-        """What was learned of a packet that differs in its numbers only; None if there is none."""
+        """Return the plan of a packet that differs only in its numbers; None if there is none."""
         known = self._by_length.get(len(data))
         if known is None:
             return None
@@ -55,18 +55,18 @@ class Layouts(Generic[Plan]):
                 return layout.plan
         return None
 
-    def learn(self, data: bytes, said: Iterable[tuple[Span, Message]], plan: Plan) -> None:
-        """Remember what to make of a packet, whatever the numbers at the ends of its messages are.
+    def learn(self, data: bytes, messages: Iterable[tuple[Span, Message]], plan: Plan) -> None:
+        """Remember the plan of a packet for any numbers at the ends of its messages.
 
         Args:
-            data: a packet that was read and is well-formed.
-            said: its messages, and where each begins and ends.
-            plan: what `find` is to return; the same for any numbers.
+            data: a well-formed packet.
+            messages: its messages, and where each begins and ends.
+            plan: result of `find`, independent of the numbers.
         """
         mask = np.full(len(data), 255, dtype=np.uint8)
         if data.startswith(BUNDLE):
             mask[_TIME_TAG] = 0
-        for (_, end), message in said:
+        for (_, end), message in messages:
             mask[end - numbers_at_end(message.tags) : end] = 0
         there = np.frombuffer(data, np.uint8)
         layout = _Layout(mask, there & mask, plan)
@@ -75,7 +75,7 @@ class Layouts(Generic[Plan]):
         self._by_length.setdefault(len(data), deque(maxlen=MOST_A_LENGTH)).append(layout)
 
     def clear(self) -> None:
-        """Know none."""
+        """Forget all layouts."""
         self._by_length.clear()
 
 

@@ -1,8 +1,8 @@
-"""Open Sound Control 1.0: messages and bundles, read strictly and within bounds, and written.
+"""Open Sound Control 1.0: read messages and bundles strictly and within bounds, and write them.
 
-Source: the OSC 1.0 specification (Wright 2002), and what its 1.1 successor made required of the
-type tags. python-osc is not used to read: a bundle element of negative size hangs it, a future
-time tag makes it sleep, and it fills in arguments that are missing.
+Source: the OSC 1.0 specification (Wright 2002), and the type tags that its 1.1 successor requires.
+python-osc is not used to read: a bundle element of negative size hangs it, a future time tag makes
+it sleep, and it fills in missing arguments.
 """
 
 from __future__ import annotations
@@ -15,15 +15,15 @@ from functools import lru_cache
 Argument = int | float | str | bytes | bool | None
 
 BUNDLE = b"#bundle\0"
-DEEPEST = 8  # bundles in bundles
+DEEPEST = 8  # nested bundles
 MOST_ARGUMENTS = 4096
-_LONGEST_TAGS = 64  # characters of type tags that are worth remembering a plan for
+_LONGEST_TAGS = 64  # characters of type tags up to which a plan is cached
 _NUMBERS = {"i": "i", "f": "f", "h": "q", "t": "Q", "d": "d"}
 _CONSTANTS: dict[str, Argument] = {"T": True, "F": False, "N": None, "I": float("inf")}
 
 
 class OscError(ValueError):
-    """The bytes are no OSC packet."""
+    """The bytes are not an OSC packet."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,19 +43,19 @@ class Message:
 
 
 def read_packet(data: bytes) -> list[Message]:
-    """The messages of one datagram, in order; bundles opened, their time tags left alone.
+    """Return the messages of one datagram, in order; bundles are opened, time tags ignored.
 
     Raises:
-        OscError: anything in the datagram is malformed; then nothing of it is believed.
+        OscError: anything in the datagram is malformed; all of it is refused then.
     """
     return [read_message(data, start, end) for start, end in elements(data)]
 
 
 def elements(data: bytes) -> Iterator[tuple[int, int]]:
-    """Where each message of a datagram begins and ends, in order; bundles opened.
+    """Yield the begin and end of each message of a datagram, in order; bundles are opened.
 
     Raises:
-        OscError: a bundle is malformed; the messages themselves are not looked at.
+        OscError: a bundle is malformed; the messages themselves are not checked.
     """
     return _elements(data, 0, len(data), 0)
 
@@ -81,7 +81,7 @@ def _elements(data: bytes, start: int, end: int, depth: int) -> Iterator[tuple[i
 
 
 def read_message(data: bytes, start: int, end: int) -> Message:
-    """The message that lies between two places of a datagram.
+    """Return the message between two offsets of a datagram.
 
     Raises:
         OscError: it is malformed.
@@ -115,13 +115,13 @@ def read_message(data: bytes, start: int, end: int) -> Message:
 
 
 def numbers_at_end(tags: str) -> int:
-    """How many bytes of a message with these type tags are numbers with nothing behind them."""
+    """Return the number of bytes of numbers at the end of a message with these type tags."""
     numbers = tags[len(tags.rstrip("".join(_NUMBERS))) :]
     return struct.calcsize(">" + "".join(_NUMBERS[tag] for tag in numbers))
 
 
 def _steps(tags: str) -> tuple[tuple[str, struct.Struct | None], ...]:
-    """How to read arguments: runs of numbers at once, everything else by itself."""
+    """How to read arguments: runs of numbers at once, every other argument separately."""
     steps: list[tuple[str, struct.Struct | None]] = []
     run = ""
     for tag in tags:
@@ -129,7 +129,7 @@ def _steps(tags: str) -> tuple[tuple[str, struct.Struct | None], ...]:
             run += _NUMBERS[tag]
             continue
         if tag not in "sb" and tag not in _CONSTANTS:
-            raise OscError(f"the type tag {tag!r} is not known")
+            raise OscError(f"the type tag {tag!r} is unknown")
         if run:
             steps.append(("", struct.Struct(">" + run)))
             run = ""
@@ -143,7 +143,7 @@ _plan = lru_cache(maxsize=256)(_steps)
 
 
 def _text(data: bytes, start: int, end: int) -> tuple[str, int]:
-    """A string at `start`, and where what follows its padding begins."""
+    """The string at `start`, and the offset after its padding."""
     stop = data.find(b"\0", start, end)
     if stop < 0:
         raise OscError("a string does not end")
@@ -157,7 +157,7 @@ def _text(data: bytes, start: int, end: int) -> tuple[str, int]:
 
 
 def _blob(data: bytes, start: int, end: int) -> tuple[bytes, int]:
-    """A blob at `start`, and where what follows its padding begins."""
+    """The blob at `start`, and the offset after its padding."""
     if end - start < 4:
         raise OscError("a blob has no size")
     (size,) = struct.unpack_from(">i", data, start)
@@ -168,10 +168,10 @@ def _blob(data: bytes, start: int, end: int) -> tuple[bytes, int]:
 
 
 def write_message(address: str, tags: str = "", *arguments: float | str) -> bytes:
-    """One message with the arguments that its type tags (of i, f, s, h, d) say.
+    """Return one message with arguments according to its type tags (of i, f, s, h, d).
 
     Raises:
-        OscError: a type tag is none of these.
+        OscError: another type tag.
     """
     data = [_padded(address), _padded("," + tags)]
     for tag, argument in zip(tags, arguments, strict=True):
@@ -185,9 +185,9 @@ def write_message(address: str, tags: str = "", *arguments: float | str) -> byte
 
 
 def write_bundles(messages: Iterable[bytes], longest: int) -> Iterator[bytes]:
-    """The messages in order, as few bundles as hold them with `longest` bytes at most in each.
+    """Yield the messages in order in as few bundles of at most `longest` bytes as possible.
 
-    A message that is longer by itself gets a bundle of its own.
+    A longer message gets a bundle of its own.
     """
     head = BUNDLE + struct.pack(">Q", 1)  # time tag: at once
     bundle = [head]

@@ -1,20 +1,21 @@
-"""Depth-camera programs that send joints by UDP: ``nimate://127.0.0.1:7000``.
+"""Device ``nimate://127.0.0.1:7000``: depth-camera programs that send joints by UDP.
 
 NI mate (port 7000), OSCeleton and Animata's puppets (7110), KinectV2-OSC, and skelecaster (11011).
-Which one sends is told by what comes; ``?format=nimate|osceleton|animata|kinect2|skelecaster``
-hears that one only. With kinect2 and skelecaster the skeleton has Kinect's 25 joints, else OpenNI's
-15 and the middle of the hips.
+The messages determine the sender; ``?format=nimate|osceleton|animata|kinect2|skelecaster`` accepts
+only one. With kinect2 and skelecaster the skeleton has Kinect's 25 joints, else OpenNI's 15 and the
+middle of the hips.
 
 - NI mate: right-handed, Y up, the performer faces -Z; quaternions (w, x, y, z), world to joint, of
-  a body in a T-pose; where only those come, forward kinematics place the joints. ``/NI_mate_sync``
-  ends a frame. Source: Delicode's documentation of OSC and skeleton tracking, and its plug-ins.
+  a body in a T-pose; if only rotations come, forward kinematics places the joints.
+  ``/NI_mate_sync`` ends a frame. Source: Delicode's documentation of OSC and skeleton tracking, and
+  its plug-ins.
 - OSCeleton: 2.56 m, 1.92 m and 1.28 m to the unit, mirrored or not. Source: its README and `-xr`.
 - Animata: pictures, mirrored or not, any unit.
 - KinectV2-OSC, skelecaster: metres in the camera's axes.
 
-Units of the first three are not to be trusted: their torso is given the length of the built-in
-body's, unless ``?scale=METRES`` says what a unit is. ``?joints=head,neck,...`` gives the order of
-the joints in NI mate's Omni list, which has no names.
+The units of the first three are unreliable: their torso gets the length of the built-in body's,
+unless ``?scale=METRES`` states the unit. ``?joints=head,neck,...`` gives the order of the joints in
+NI mate's Omni list, which has no names.
 """
 
 from __future__ import annotations
@@ -45,45 +46,45 @@ Array = NDArray[np.float64]
 
 PORT = 7000
 SKELECASTER = "skelecaster"
-FORMATS = (*(str(told) for told in JointFormat), SKELECASTER)
+FORMATS = (*(str(format) for format in JointFormat), SKELECASTER)
 MOST_USERS = 16
-PRESENT = 0.1  # [s] without a frame after which a user's number may go on with another id
+PRESENT = 0.1  # [s] without a frame, after which another id may take a user's number
 GONE = 5.0  # [s] after which a user is forgotten
-SYNCED = 1.0  # [s] for which frames are expected to be ended by NI mate's mark
-AGAIN = 0.004  # [s] within which the same datagram is the network's doing, not the sender's
-INFERRED = 0.3  # confidence of a joint that only others tell of
+SYNCED = 1.0  # [s] after NI mate's mark in which frames are expected to end with one
+AGAIN = 0.004  # [s] within which an equal datagram is a duplicate made by the network
+INFERRED = 0.3  # confidence of a joint that is derived from others
 
 _COUNT = len(KINECT_V2.names)
 _SYNC = {"/NI_mate_sync", "NI_mate_sync"}
 _LOST = "/lost_user"
-# NI mate's rotation, world to joint, undone, and turned half about Y with the body.
+# Inverts NI mate's rotation, world to joint, and turns it half about Y with the body.
 _TURN = np.array([1.0, -1.0, 1.0, 1.0])
 
 
 @dataclass(slots=True, eq=False)
 class _User:
-    """What is known of one user: the frame that is being put together, and what it is made with."""
+    """State of one user: the frame being assembled and the converter of its body."""
 
     body: CameraBody
     assembly: FrameAssembly = field(default_factory=FrameAssembly)
     positions: Array = field(default_factory=lambda: np.full((_COUNT, 3), np.nan))
     rotations: Array = field(default_factory=lambda: np.full((_COUNT, 4), np.nan))
-    told: JointFormat = JointFormat.NIMATE
+    format: JointFormat = JointFormat.NIMATE
     place: Array = field(default_factory=lambda: np.full(3, np.nan))
     heard: float = -math.inf
 
 
 class NimateDecoder:
-    """Frames of everyone of whom one sender tells; their time is the arrival, for nobody sends one.
+    """Frames of all users that one sender reports; frame times are arrivals, as none are sent.
 
     Args:
-        format: of `FORMATS`; None to tell it by what comes.
-        scale: [m] of the sender's unit; None to go by the torso where it is not known.
-        omni: the joints of NI mate's Omni list, as indices of KINECT_V2; empty to go by their
-            number.
+        format: of `FORMATS`; None to detect it.
+        scale: [m] of the sender's unit; None to derive it from the torso where it is unknown.
+        omni: the joints of NI mate's Omni list, as indices of KINECT_V2; empty to derive the order
+            from their number.
 
     Attributes:
-        refused: datagrams and messages that were malformed, repeated or of one user too many.
+        refused: datagrams and messages that were malformed, repeated, or of one user too many.
     """
 
     def __init__(
@@ -102,12 +103,12 @@ class NimateDecoder:
 
     @property
     def skeleton(self) -> Skeleton:
-        """Kinect's joints where only such come, else OpenNI's."""
+        """Kinect's joints for formats that have only those, else OpenNI's."""
         return KINECT_V2 if self._kinect else OPENNI
 
-    @np.errstate(over="ignore", invalid="ignore")  # whatever a damaged packet holds
+    @np.errstate(over="ignore", invalid="ignore")  # values of a damaged packet
     def feed(self, data: bytes, arrival: float) -> Sequence[SkeletonFrame]:
-        """The frames that a datagram, which came at `arrival` [s], completes."""
+        """Return the frames that a datagram, received at `arrival` [s], completes."""
         repeated = data == self._last[0] and arrival - self._last[1] < AGAIN
         self._last = data, arrival
         if repeated:
@@ -131,7 +132,7 @@ class NimateDecoder:
         for cast in bodies:
             user = self._user(cast.id, arrival)
             if user is not None:
-                user.told = JointFormat.KINECT
+                user.format = JointFormat.KINECT
                 near = (np.abs(cast.positions) < 100.0).all(axis=1) & (cast.confidence > 0.0)
                 user.positions[near] = cast.positions[near]
                 frames.append(self._frame(cast.id, user, arrival, cast.confidence))
@@ -160,7 +161,7 @@ class NimateDecoder:
         return frames
 
     def _hear(self, message: Message, arrival: float) -> list[SkeletonFrame]:
-        """Take in a message about joints; the frames that end because they come again."""
+        """Add a joint message; return the frames that end because their joints repeat."""
         joints = read_joints(message, self._only, self._omni)
         if joints is None:
             self.refused += 1
@@ -177,7 +178,7 @@ class NimateDecoder:
                     continue
                 frames.append(self._finish(joint.user, user))
             user.assembly.add(part, arrival)
-            user.told = joint.format
+            user.format = joint.format
             if joint.position is not None:
                 user.positions[joint.joint] = joint.position
             if joint.rotation is not None:
@@ -185,7 +186,7 @@ class NimateDecoder:
         return frames
 
     def _user(self, number: int, arrival: float) -> _User | None:
-        """The user of that number; None where there are too many."""
+        """The user with that number; None if there are too many."""
         if number not in self._users:
             for gone in [n for n, u in self._users.items() if arrival - u.heard > GONE]:
                 del self._users[gone]
@@ -205,14 +206,14 @@ class NimateDecoder:
         ]
 
     def _finish(self, number: int, user: _User) -> SkeletonFrame:
-        """End the frame that was being put together."""
+        """End the frame being assembled."""
         arrival = user.assembly.newest
         user.assembly.end()
         return self._frame(number, user, arrival, np.ones(_COUNT))
 
     def _frame(self, number: int, user: _User, arrival: float, sure: Array) -> SkeletonFrame:
-        """The frame of what is known of a user, which is then forgotten."""
-        positions, rotations = user.body.place(user.positions, user.told), user.rotations * _TURN
+        """Make a frame of a user's current joints, and clear them."""
+        positions, rotations = user.body.place(user.positions, user.format), user.rotations * _TURN
         user.positions, user.rotations = np.full((_COUNT, 3), np.nan), np.full((_COUNT, 4), np.nan)
         if not self._kinect:
             chosen = openni_choice(~np.isnan(positions[:, 0]))
@@ -233,7 +234,7 @@ class NimateDecoder:
         )
 
     def _number(self, number: int, arrival: float) -> int:
-        """The performer that a user is, among all who are there."""
+        """The performer number of a user, among all present users."""
         there = {
             other: user.place
             for other, user in self._users.items()
@@ -243,16 +244,16 @@ class NimateDecoder:
 
 
 def _same(user: _User, joint: JointMessage) -> bool:
-    """Whether a joint came twice, rather than with the next frame."""
+    """Whether a joint is a repetition rather than part of the next frame."""
     if joint.position is not None:
         return bool((user.positions[joint.joint] == joint.position).all())
     return bool((user.rotations[joint.joint] == joint.rotation).all())
 
 
 def _by_rotations(rotations: Array) -> tuple[Array, Array]:
-    """Where rotations (16, 4) to the world put the joints of a T-pose: (16, 3) [m], confidence.
+    """Joints (16, 3) [m] of a T-pose turned by world rotations (16, 4), and their confidence.
 
-    A joint that has none turns with the one that it hangs on.
+    A joint without a rotation turns with its parent.
     """
     turns, positions = rotations.copy(), np.array(OPENNI.rest_positions)
     for joint in OPENNI.order:
@@ -266,7 +267,7 @@ def _by_rotations(rotations: Array) -> tuple[Array, Array]:
 
 
 def _omni_order(text: str) -> tuple[int, ...]:
-    """Reads ``NAME,NAME,...``."""
+    """Parse ``NAME,NAME,...``."""
     joints = [joint_called(name) for name in text.split(",")]
     known = tuple(joint for joint in joints if joint is not None)
     if len(known) < len(joints) or len(set(known)) < len(known):
@@ -278,7 +279,7 @@ def open_device(address: SplitResult) -> LiveStream:
     """Listen at ``nimate://HOST:PORT?format=FORMAT&scale=METRES&joints=NAME,...``.
 
     Raises:
-        InputError: the port is taken, or an option is not known.
+        InputError: the port is taken, or an option is unknown.
     """
     options = options_of(
         address, {"format": one_of(*FORMATS), "scale": positive, "joints": _omni_order}

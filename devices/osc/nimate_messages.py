@@ -1,7 +1,7 @@
-"""What NI mate, OSCeleton, Animata and KinectV2-OSC say of single joints.
+"""Decode the joint messages of NI mate, OSCeleton, Animata and KinectV2-OSC.
 
-None of them names its format; address and arguments tell. Nothing that comes is ever evaluated: an
-address is looked up, and is nobody's if it is not known.
+None of them names its format; address and arguments determine it. Received text is never evaluated:
+an address is looked up, and ignored if it is unknown.
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ from devices.kinect.joints import KINECT_V2
 from devices.osc.messages import Message
 from devices.osc.openni_joints import joint_called, number_in
 
-FARTHEST = 1e5  # units, whatever they are, or a position is not believed
+FARTHEST = 1e5  # units, whatever they are, of a plausible position
 
 
 class JointFormat(StrEnum):
-    """Whose messages they are; the value is the one of the option ``format``."""
+    """Format of the messages; the value is that of the option ``format``."""
 
     NIMATE = "nimate"
     OSCELETON = "osceleton"
@@ -32,11 +32,11 @@ class JointMessage:
     """One joint of one user.
 
     Attributes:
-        format: whose axes and units position and rotation have.
-        user: a number of the sender's own.
+        format: determines axes and units of position and rotation.
+        user: the sender's own number.
         joint: index in KINECT_V2.
-        position: in the sender's axes and units, z = 0 in Animata; None if it is not told.
-        rotation: (x, y, z, w) as sent, unit length; None if it is not told.
+        position: in the sender's axes and units, z = 0 in Animata; None if missing.
+        rotation: (x, y, z, w) as sent, unit length; None if missing.
     """
 
     format: JointFormat
@@ -53,7 +53,7 @@ _JOINT = ("/joint", "joint", "/joint_", "joint_")
 _OMNI = re.compile(r"/?(?:[^/]+/)*skeleton[_/]?[0-9]*")
 _JOINTS = {name: joint for joint, name in enumerate(KINECT_V2.names)}
 
-# Omni's order is not documented: that of the sensors' own SDKs, told by how many joints there are.
+# Omni's order is not documented. The order of the sensors' own SDKs, by the number of joints:
 _LEFT_ARM_FIRST = (
     *("l_shoulder l_elbow l_hand r_shoulder r_elbow r_hand".split()),
     *("l_hip l_knee l_foot r_hip r_knee r_foot".split()),
@@ -68,31 +68,30 @@ OMNI_ORDERS: dict[int, tuple[int, ...]] = {
 def read_joints(
     message: Message, only: JointFormat | None = None, omni: Sequence[int] = ()
 ) -> list[JointMessage] | None:
-    """The joints that a message tells of: none if it is about something else, None if malformed.
+    """Return the joints in a message: [] for other messages, None if it is malformed.
 
     Args:
-        message: as it came.
-        only: the format to expect; None to tell it by the message.
-        omni: the joints of NI mate's Omni list, in its order; empty to go by their number.
+        message: as received.
+        only: the format to accept; None to detect it from the message.
+        omni: the joints of NI mate's Omni list, in its order; empty to derive it from their number.
     """
     kinect = _KINECT.fullmatch(message.address)
     if kinect is not None:
-        return (
-            _kinect(message, int(kinect[1]), kinect[2]) if _wanted(JointFormat.KINECT, only) else []
-        )
+        accepted = _accepts(only, JointFormat.KINECT)
+        return _kinect(message, int(kinect[1]), kinect[2]) if accepted else []
     if message.address in _JOINT:
         return _named_by_argument(message, only)
     quartz = only is not JointFormat.NIMATE and _QUARTZ.fullmatch(message.address) is not None
-    told = JointFormat.OSCELETON if quartz else JointFormat.NIMATE
-    if not _wanted(told, only) or message.address.lstrip("/").split("/", 1)[0] in _ELSEWHERE:
+    format = JointFormat.OSCELETON if quartz else JointFormat.NIMATE
+    if not _accepts(only, format) or message.address.lstrip("/").split("/", 1)[0] in _ELSEWHERE:
         return []
     if _OMNI.fullmatch(message.address):
         return _omni(message, omni)
-    return _named_by_address(message, told)
+    return _named_by_address(message, format)
 
 
-def _wanted(told: JointFormat, only: JointFormat | None) -> bool:
-    return only is None or told is only
+def _accepts(only: JointFormat | None, format: JointFormat) -> bool:
+    return only is None or format is only
 
 
 def _kinect(message: Message, user: int, name: str) -> list[JointMessage] | None:
@@ -104,7 +103,7 @@ def _kinect(message: Message, user: int, name: str) -> list[JointMessage] | None
 
 
 def _named_by_argument(message: Message, only: JointFormat | None) -> list[JointMessage] | None:
-    """OSCeleton's ``/joint name user x y z``, Animata's ``/joint nameUSER x y``."""
+    """Decode OSCeleton's ``/joint name user x y z`` and Animata's ``/joint nameUSER x y``."""
     tags, arguments = message.tags, message.arguments
     if tags[:1] != "s" or tags.lstrip("s").lstrip("i") not in ("ff", "fff"):
         return None
@@ -112,19 +111,19 @@ def _named_by_argument(message: Message, only: JointFormat | None) -> list[Joint
     user = arguments[1] if tags[1] == "i" else number_in(name)
     joint = joint_called(name)
     assert isinstance(user, int)
-    told = JointFormat.ANIMATA if len(numbers) == 2 else JointFormat.OSCELETON
-    if told is JointFormat.OSCELETON and only is JointFormat.NIMATE:
-        told = JointFormat.NIMATE  # which can write in this style too, in its own axes
+    format = JointFormat.ANIMATA if len(numbers) == 2 else JointFormat.OSCELETON
+    if format is JointFormat.OSCELETON and only is JointFormat.NIMATE:
+        format = JointFormat.NIMATE  # it can write in this style too, in its own axes
     position = _position((*numbers, 0.0)[:3])
     if position is None or len(tags) > 5:
         return None
-    if joint is None or not (_wanted(told, only) or only is JointFormat.NIMATE):
+    if joint is None or not (_accepts(only, format) or only is JointFormat.NIMATE):
         return []
-    return [JointMessage(told, user, joint, position)]
+    return [JointMessage(format, user, joint, position)]
 
 
-def _named_by_address(message: Message, told: JointFormat) -> list[JointMessage] | None:
-    """NI mate's formats, told by how many floats there are: 3, 4 or 7."""
+def _named_by_address(message: Message, format: JointFormat) -> list[JointMessage] | None:
+    """Decode NI mate's formats, distinguished by the number of floats: 3, 4 or 7."""
     joint = joint_called(message.address)
     if joint is None:
         return []
@@ -144,11 +143,11 @@ def _named_by_address(message: Message, told: JointFormat) -> list[JointMessage]
         return None
     if position is None and rotation is None:
         return []  # a limb whose orientation was not found has four zeros
-    return [JointMessage(told, user, joint, position, rotation)]
+    return [JointMessage(format, user, joint, position, rotation)]
 
 
 def _omni(message: Message, order: Sequence[int]) -> list[JointMessage] | None:
-    """NI mate's list of the positions of all joints."""
+    """Decode NI mate's list of the positions of all joints."""
     tags = message.tags
     users, values = message.arguments[: tags.count("i")], message.arguments[tags.count("i") :]
     if tags.lstrip("i").strip("f") or len(users) > 1 or len(values) % 3:
@@ -167,18 +166,18 @@ def _omni(message: Message, order: Sequence[int]) -> list[JointMessage] | None:
 
 
 def _position(values: Sequence[object]) -> tuple[float, float, float] | None:
-    """Three numbers; None where they are not three, or beyond belief."""
+    """Three numbers, or None if there are not three or the position is implausible."""
     if len(values) != 3:
         return None
     x, y, z = values
     assert isinstance(x, float)
     assert isinstance(y, float)
     assert isinstance(z, float)
-    return (x, y, z) if abs(x) + abs(y) + abs(z) < FARTHEST else None  # NaN is not
+    return (x, y, z) if abs(x) + abs(y) + abs(z) < FARTHEST else None  # None for NaN
 
 
 def _rotation(values: Sequence[object]) -> tuple[float, float, float, float] | None:
-    """NI mate's w, x, y, z as x, y, z, w of unit length; None where that is no rotation."""
+    """NI mate's w, x, y, z as x, y, z, w of unit length; None if that is no rotation."""
     w, x, y, z = values
     assert isinstance(w, float)
     assert isinstance(x, float)

@@ -1,8 +1,8 @@
-"""The joints of depth-camera programs that speak OSC: names of many spellings, one skeleton.
+"""Joints of depth-camera programs that send OSC: parse their names, map them to one skeleton.
 
-What comes is kept under Kinect v2's 25 joints, of which the others' are a part: OpenNI's neck,
-which lies between the shoulders, is `SpineShoulder`, its torso `SpineMid`, its waist `SpineBase`.
-The skeleton that is given has the 15 joints of OpenNI, and the middle of the hips.
+Received joints are stored as Kinect v2's 25 joints, which include all others: OpenNI's neck, which
+lies between the shoulders, is `SpineShoulder`, its torso `SpineMid`, its waist `SpineBase`. The
+output skeleton has the 15 joints of OpenNI and the middle of the hips.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ for _side in ("Left", "Right"):
 OPENNI = skeleton_on_humanoid(_POINTS)
 """16 joints in a T-pose."""
 
-# Kinect's joint of each of OpenNI's, and the one that stands in for it where it was not seen.
+# Kinect's joint for each of OpenNI's, and the joint that replaces it where it was not seen.
 _FROM_KINECT = {
     "Pelvis": ("SpineBase", "SpineBase"),
     "Torso": ("SpineMid", "SpineMid"),
@@ -87,19 +87,19 @@ _SIDED = {
 }
 _WORDS = {"wrist": "Wrist", "ankle": "Ankle", "fingertip": "HandTip", "thumb": "Thumb"}
 _WAIST = "waist"
-_AROUND = re.compile(r"skeleton|joints?|/", re.IGNORECASE)  # what programs write around a name
+_AROUND = re.compile(r"skeleton|joints?|/", re.IGNORECASE)  # text around a joint's name
 _COLLARS = {"collar", "clavicle", "collarbone"}
 
 
 def openni_choice(seen: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Which of Kinect's joints each of OpenNI's is, (16,), by which of those (25,) were seen."""
+    """Return the Kinect joint of each OpenNI joint (16,), given which joints (25,) were seen."""
     chosen: NDArray[np.int64] = np.where(seen[_FIRST], _FIRST, _SECOND)
     return chosen
 
 
 @lru_cache(maxsize=4096)
 def joint_called(name: str) -> int | None:
-    """The index in KINECT_V2 of the joint that a name or an address stands for; None if none."""
+    """Return the index in KINECT_V2 of the joint that a name or address refers to, or None."""
     if len(name) > LONGEST_NAME:
         return None
     part = part_of_name(_AROUND.sub("_", name).strip("_"))
@@ -115,6 +115,6 @@ def joint_called(name: str) -> int | None:
 
 @lru_cache(maxsize=4096)
 def number_in(name: str) -> int:
-    """The last number in a name or an address, which tells whose joint it is; 0 where none is."""
+    """Return the last number in a name or address, the user's number; 0 if there is none."""
     numbers = re.findall(r"[0-9]+", name[-LONGEST_NAME:])
     return int(numbers[-1][:19]) if numbers else 0

@@ -1,4 +1,4 @@
-"""skelecaster's datagrams: the bodies of a Kinect v2, binary, little-endian.
+"""Decode skelecaster's datagrams: the bodies of a Kinect v2, binary, little-endian.
 
 Source: jaz303/skelecaster, README: packet format. Metres in the camera's axes; no time.
 """
@@ -28,7 +28,7 @@ class CastBody:
 
 
 def read_bodies(data: bytes) -> list[CastBody] | None:
-    """The bodies in a datagram; None where it is another, or not as long as it says."""
+    """Return the bodies in a datagram; None if it is another one, or its length is wrong."""
     if data[:3] != HEAD or len(data) < 4 or len(data) != 4 + data[3] * _BODY.itemsize:
         return None
     bodies = np.frombuffer(data, _BODY, offset=4)

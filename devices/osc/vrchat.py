@@ -1,8 +1,9 @@
-"""VRChat's OSC trackers: ``vrchat://`` listens where VRChat does, on port 9000 of this machine.
+"""Device ``vrchat://``: VRChat's OSC trackers, received on VRChat's port 9000 of this machine.
 
-Up to eight trackers and the head, each with a position and Euler angles in Unity's space. Nobody
-says which of them is where on the body: that is told when they are first seen, from a performer
-who stands upright, or by the user: ``vrchat://127.0.0.1:9000?trackers=1:Hips,2:LeftFoot``.
+Up to eight trackers and the head, each with a position and Euler angles in Unity's space. The
+messages do not name body parts. Trackers are assigned to joints when they are first seen, from a
+performer who stands upright, or by the user:
+``vrchat://127.0.0.1:9000?trackers=1:Hips,2:LeftFoot``.
 
 Source: VRChat's documentation of OSC trackers.
 """
@@ -26,10 +27,10 @@ from devices.transport.live_stream import LiveStream
 from devices.transport.udp import UdpTransport
 
 PORT = 9000
-FARTHEST = 1000.0  # [m] or a position is not believed
+FARTHEST = 1000.0  # [m] of a plausible position
 MOST_DEGREES = 1e5
-SETTLING = 1.0  # [s] from the first frame in which trackers' places may still change
-GONE = 1.0  # [s] after which a tracker that sends no more is not seen any more
+SETTLING = 1.0  # [s] from the first frame in which the assignment may still change
+GONE = 1.0  # [s] without a position, after which a tracker counts as not seen
 
 _TRACKERS = 8
 _HEAD_ID = 0
@@ -37,14 +38,13 @@ _ADDRESS = re.compile(r"/tracking/trackers/(?:([1-8])|head)/(position|rotation)"
 
 
 class VrchatDecoder:
-    """Frames of one sender's trackers; a frame's time is its arrival, for nobody sends one.
+    """Frames of one sender's trackers; frame times are arrivals, as none are sent.
 
     Args:
-        places: the index in JOINTS of each tracker's place, by its number; empty to be told by
-            where they are.
+        places: the index in JOINTS for each tracker number; empty to assign trackers by position.
 
     Attributes:
-        refused: datagrams and messages that were malformed or beyond belief.
+        refused: datagrams and messages that were malformed or implausible.
     """
 
     skeleton = tracker_skeleton()
@@ -57,10 +57,10 @@ class VrchatDecoder:
         self._assembly = FrameAssembly()
         self._positions = np.zeros((_TRACKERS + 1, 3))
         self._turns = np.full((_TRACKERS + 1, 4), np.nan)
-        self._seen = np.full(_TRACKERS + 1, -np.inf)  # when each position came
+        self._seen = np.full(_TRACKERS + 1, -np.inf)  # arrival [s] of each position
 
     def feed(self, data: bytes, arrival: float) -> Sequence[SkeletonFrame]:
-        """The frames that a datagram, which came at `arrival` [s], completes."""
+        """Return the frames that a datagram, received at `arrival` [s], completes."""
         try:
             messages = read_packet(data)
         except OscError:
@@ -92,12 +92,12 @@ class VrchatDecoder:
         return frames
 
     def _finish(self) -> list[SkeletonFrame]:
-        """The frame of the newest pose of each tracker; none before there is a body's tracker."""
+        """The frame of the newest pose of each tracker; none without a tracker on the body."""
         arrival = self._assembly.newest
         self._assembly.end()
         there = [int(i) for i in np.flatnonzero(arrival - self._seen < GONE)]
         self._first = arrival if self._first is None else self._first
-        self._tell_places(there, settled=arrival - self._first > SETTLING)
+        self._assign(there, settled=arrival - self._first > SETTLING)
         positions = np.full((len(JOINTS), 3), np.nan)
         rotations = np.full((len(JOINTS), 4), np.nan)
         for tracker in there:
@@ -109,8 +109,8 @@ class VrchatDecoder:
             return []
         return [SkeletonFrame(arrival, positions, rotations, seen * 1.0, arrival=arrival)]
 
-    def _tell_places(self, there: Sequence[int], *, settled: bool) -> None:
-        """Find out where new trackers are; once all has settled, the others stay where they are."""
+    def _assign(self, there: Sequence[int], *, settled: bool) -> None:
+        """Assign new trackers to joints; after settling, the others keep theirs."""
         if self._given or {_HEAD_ID, *self._places} >= set(there):
             return
         kept = self._places if settled else {}
@@ -123,15 +123,15 @@ class VrchatDecoder:
 
 
 def _three(message: Message, most: float) -> NDArray[np.float64] | None:
-    """The three numbers of a message; None where they are not three, or beyond belief."""
+    """The three numbers of a message; None if there are not three or one is implausible."""
     if not message.tags.startswith("fff"):
         return None
     values = np.array(message.arguments[:3], dtype=np.float64)
-    return values if (np.abs(values) < most).all() else None  # NaN is not
+    return values if (np.abs(values) < most).all() else None  # None for NaN
 
 
 def _places(text: str) -> dict[int, int]:
-    """Reads ``NUMBER:JOINT,NUMBER:JOINT``."""
+    """Parse ``NUMBER:JOINT,NUMBER:JOINT``."""
     places: dict[int, int] = {}
     for pair in text.split(","):
         number, _, joint = pair.partition(":")
@@ -146,7 +146,7 @@ def open_device(address: SplitResult) -> LiveStream:
     """Listen at ``vrchat://HOST:PORT?trackers=NUMBER:JOINT,...``.
 
     Raises:
-        InputError: the port is taken, or an option is not known.
+        InputError: the port is taken, or an option is unknown.
     """
     options = options_of(address, {"trackers": _places})
     host, port = host_and_port(address, PORT)

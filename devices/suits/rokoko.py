@@ -1,10 +1,11 @@
-"""Rokoko Studio's live stream: ``rokoko://127.0.0.1:14043``, JSON by UDP, a scene a datagram.
+"""Device ``rokoko://127.0.0.1:14043``: Rokoko Studio's live stream, JSON by UDP.
 
-Versions 2 and 3 of its format, as plain JSON or as an LZ4 frame. Every bone has an absolute
-position [m] and rotation in Unity's space; rotations keep the local axes of Rokoko's own rig. The
-scene's time starts again when a clip loops. Faces, props and trackers are passed over.
+Each datagram is one scene in version 2 or 3 of the format, as plain JSON or as an LZ4 frame. Every
+bone has an absolute position [m] and rotation in Unity's space; rotations keep the local axes of
+Rokoko's own rig. The scene's time starts again when a clip loops. Faces, props and trackers are
+ignored.
 
-Source: Rokoko Studio's custom streaming documentation, and how its plug-ins read it.
+Source: Rokoko Studio's custom streaming documentation, and its plug-ins.
 """
 
 from __future__ import annotations
@@ -31,20 +32,20 @@ from devices.transport.udp import UdpTransport
 Array = NDArray[np.float64]
 
 PORT = 14043
-MOST_BYTES = 1 << 20  # of a scene's JSON; five actors with hands and faces have 150 kB
+MOST_BYTES = 1 << 20  # of a scene's JSON; five actors with hands and faces take 150 kB
 MOST_ACTORS = 16
 LONGEST_NAME = 256
-FARTHEST = 1000.0  # [m] or a position is not believed
-AGAIN = 0.004  # [s] within which the same datagram is the network's doing, not the sender's
-MOST_OVERTAKEN = 2  # scenes in a row
+FARTHEST = 1000.0  # [m] of a plausible position
+AGAIN = 0.004  # [s] within which an equal datagram is a duplicate made by the network
+MOST_OVERTAKEN = 2  # late scenes in a row; more are a clip that loops
 _MAGIC = b"\x04\x22\x4d\x18"
 
 
 class RokokoDecoder:
-    """Frames of every actor of one Rokoko Studio; an actor is known by the name.
+    """Frames of every actor of one Rokoko Studio; an actor is identified by name.
 
     Attributes:
-        refused: datagrams, actors and bones that were malformed, late, repeated or beyond belief.
+        refused: datagrams, actors and bones that were malformed, late, repeated or implausible.
     """
 
     skeleton = SKELETON
@@ -52,15 +53,15 @@ class RokokoDecoder:
     def __init__(self) -> None:
         self.refused = 0
         self._clock = ClockMap()
-        self._numbers: OrderedDict[str, int] = OrderedDict()  # who was seen last comes last
+        self._numbers: OrderedDict[str, int] = OrderedDict()  # the actor seen last comes last
         self._stamp = math.nan
         self._came = -math.inf
-        self._behind = 0  # scenes in a row that were overtaken
+        self._behind = 0  # late scenes in a row
         self._last = b""
 
-    @np.errstate(over="ignore", invalid="ignore")  # whatever a damaged packet holds
+    @np.errstate(over="ignore", invalid="ignore")  # values of a damaged packet
     def feed(self, data: bytes, arrival: float) -> Sequence[SkeletonFrame]:
-        """A frame of each actor in a datagram that came at `arrival` [s]."""
+        """Return a frame of each actor in a datagram received at `arrival` [s]."""
         scene = _scene(data)
         if scene is None or self._repeated(data, arrival):
             self.refused += 1
@@ -69,7 +70,7 @@ class RokokoDecoder:
         if self._overtaken(stamp, arrival):
             self.refused += 1
             return ()
-        # A clock that stands (a clip that is paused, a sender without one) tells nothing.
+        # A constant clock (a paused clip, a sender without a clock) gives no time.
         time = self._clock.host_time(math.nan if stamp == self._stamp else stamp, arrival)
         self._stamp, self._came, self._last = stamp, arrival, data
         frames = []
@@ -87,13 +88,13 @@ class RokokoDecoder:
         return data == self._last and arrival - self._came < AGAIN
 
     def _overtaken(self, stamp: float, arrival: float) -> bool:
-        """Whether a newer scene came before, just now; several in a row are a clip that loops."""
+        """Whether a newer scene came just before; several late ones in a row are a looping clip."""
         late = 0.0 < self._stamp - stamp <= STEP_BACK and arrival - self._came < STEP_BACK
         self._behind = self._behind + 1 if late else 0
         return 0 < self._behind <= MOST_OVERTAKEN
 
     def _frame(self, actor: Any, time: float, arrival: float) -> SkeletonFrame | None:
-        """An actor's frame; None where there is no body, or no name to know it by."""
+        """An actor's frame; None without a body or a name."""
         if not isinstance(actor, dict):
             return None
         name, body = actor.get("name", actor.get("id")), actor.get("body", actor)
@@ -113,14 +114,14 @@ class RokokoDecoder:
         )
 
     def _bones(self, body: Mapping[str, Any]) -> tuple[Array, Array]:
-        """Positions (J, 3) [m] and rotations (J, 4) as sent; NaN where there is none."""
+        """Positions (J, 3) [m] and rotations (J, 4) as sent; NaN where missing."""
         table = np.full((len(SKELETON.names), 7), np.nan)
         for joint, name in enumerate(SKELETON.names):
             bone = body.get(name)
             if bone is not None:
                 table[joint] = _pose(bone)
         positions, rotations = table[:, :3], table[:, 3:]
-        near = (np.abs(positions) < FARTHEST).all(axis=1)  # NaN is not
+        near = (np.abs(positions) < FARTHEST).all(axis=1)  # False for NaN
         positions[~near] = np.nan
         self.refused += sum(SKELETON.names[joint] in body for joint in np.flatnonzero(~near))
         length = np.linalg.norm(rotations, axis=1)
@@ -130,7 +131,7 @@ class RokokoDecoder:
         return positions, rotations
 
     def _number_of(self, name: str) -> int:
-        """The actor's number; of a new one the lowest that is free."""
+        """The actor's number; a new actor gets the lowest free one."""
         if name not in self._numbers:
             if len(self._numbers) >= MOST_ACTORS:
                 self._numbers.popitem(last=False)
@@ -142,9 +143,9 @@ class RokokoDecoder:
 
 
 def _scene(data: bytes) -> dict[str, Any] | None:
-    """What has the actors: the scene of version 3, the whole message of version 2; None if nothing.
+    """The object with the actors: the scene in version 3, the whole message in version 2, or None.
 
-    A message of version 2.5 calls itself 3, so what is there decides and not the number.
+    A message of version 2.5 states version 3, so the structure decides, not the number.
     """
     text = _unpacked(data)
     if text is None:
@@ -163,7 +164,7 @@ def _scene(data: bytes) -> dict[str, Any] | None:
 
 
 def _unpacked(data: bytes) -> bytes | None:
-    """The JSON of a datagram, at most `MOST_BYTES`, whatever an LZ4 frame claims or grows to."""
+    """The JSON of a datagram, at most `MOST_BYTES`, whatever size an LZ4 frame states."""
     if not data.startswith(_MAGIC):
         return data if len(data) <= MOST_BYTES else None
     frame = lz4.frame.LZ4FrameDecompressor()
@@ -175,7 +176,7 @@ def _unpacked(data: bytes) -> bytes | None:
 
 
 def _pose(bone: Any) -> tuple[float, ...]:
-    """Position and rotation of a bone; NaN where a number is missing or none."""
+    """Position and rotation of a bone; NaN where a number is missing or invalid."""
     parts = [bone.get(key) if isinstance(bone, dict) else None for key in ("position", "rotation")]
     position, rotation = (part if isinstance(part, dict) else {} for part in parts)
     return (
@@ -185,7 +186,7 @@ def _pose(bone: Any) -> tuple[float, ...]:
 
 
 def _number(value: Any) -> float:
-    """A number that JSON may have written as a whole one; NaN where it is none."""
+    """A number, which JSON may have written as an integer; NaN for any other value."""
     if type(value) is float:
         return value
     if type(value) is int and abs(value) < 1 << 53:
@@ -197,7 +198,7 @@ def open_device(address: SplitResult) -> LiveStream:
     """Listen at ``rokoko://HOST:PORT``.
 
     Raises:
-        InputError: the port is taken, or an option is not known.
+        InputError: the port is taken, or an option is unknown.
     """
     options_of(address)
     host, port = host_and_port(address, PORT)

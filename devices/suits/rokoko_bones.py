@@ -1,7 +1,7 @@
 """The bones of a Rokoko actor: names as streamed, parents, and a T-pose.
 
 Source: Rokoko Studio's custom streaming format and the names that its Blender plug-in reads. The
-format tells of no hierarchy or lengths; those of the built-in body stand in for them at rest.
+format has no hierarchy and no lengths; the rest pose takes them from the built-in body.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ _ARM = {
 _LEG = {"UpLeg": "UpperLeg", "Leg": "LowerLeg", "Foot": "Foot", "Toe": "Toes"}
 _FINGERS = ("Thumb", "Index", "Middle", "Ring", "Little")
 _SEGMENTS = {"Proximal": "Proximal", "Medial": "Intermediate", "Distal": "Distal"}
-_BEYOND = 1.8  # of a finger's middle segment, from its start to the tip
-_TOE_END = 1.3  # of the way from ankle to toes
+_BEYOND = 1.8  # of a finger's middle segment: distance of the tip from the segment's start
+_TOE_END = 1.3  # of the distance from ankle to toes
 
 
 def _side(side: str) -> dict[str, JointOnHumanoid]:

@@ -1,12 +1,12 @@
-"""Xsens MVN's network streamer: ``xsens://127.0.0.1:9763``, poses of a whole suit by UDP or TCP.
+"""Device ``xsens://127.0.0.1:9763``: Xsens MVN's network streamer, by UDP or TCP.
 
-MVN is told where to send; by TCP (``?transport=tcp``) it connects to us, and the same datagrams
-come one after another. They are big-endian. Of their kinds, MXTP02 (positions and quaternions) and
-MXTP01 (positions and Euler angles) hold a pose; a pose that is too long for one datagram comes in
-several. MVN's world is right-handed, Z up (``?up=y`` where MVN was told so), the suit's X forward
-at calibration; in MXTP01 it is Y up, Z forward. Positions are metres or centimetres, as versions
-differ; the size of the body tells. In which order MXTP01's angles are to be applied is not
-specified, so its rotations are left unknown.
+MVN sends to a configured address; by TCP (``?transport=tcp``) it connects to us, and the same
+datagrams follow one another. They are big-endian. The kinds MXTP02 (positions and quaternions) and
+MXTP01 (positions and Euler angles) hold a pose; a pose that is too long for one datagram is split.
+MVN's world is right-handed, Z up (``?up=y`` if MVN is set to Y up), with the suit's X forward at
+calibration; in MXTP01 it is Y up, Z forward. Positions are metres or centimetres, depending on the
+version; the size of the body decides. The order of MXTP01's angles is not specified, so its
+rotations are left unknown.
 
 Source: MVN real-time network streaming protocol specification, section 2.
 """
@@ -32,12 +32,12 @@ from devices.transport.udp import UdpTransport
 Array = NDArray[np.float64]
 
 PORT = 9763
-FARTHEST = 1000.0  # [m] or a position is not believed
+FARTHEST = 1000.0  # [m] of a plausible position
 MOST_CHARACTERS = 32
-MOST_OPEN = 4  # samples of one character whose datagrams are waited for
+MOST_OPEN = 4  # incomplete samples of one character that are kept
 MOST_PARTS = 8  # datagrams of one sample
-LATE = 1000  # samples that a datagram is behind at most; one further behind began to count anew
-SMALLEST_IN_CM = 5.0  # of a body whose size in metres is 0.5 or less
+LATE = 1000  # samples that a late datagram is behind at most; beyond that, MVN has restarted
+SMALLEST_IN_CM = 5.0  # size in centimetres of a body whose size in metres is at most 0.5
 
 HEADER = struct.Struct(">6sIBBIBBBBHH")
 _LAST = 0x80  # flag of the datagram counter
@@ -46,14 +46,14 @@ _SEGMENTS = {
     _QUATERNIONS: np.dtype([("id", ">u4"), ("position", ">f4", 3), ("rotation", ">f4", 4)]),
     _EULER: np.dtype([("id", ">u4"), ("position", ">f4", 3), ("angles", ">f4", 3)]),
 }
-# Names and proportions of the character, joint angles, kinematics, sensors, time code: no pose.
+# Names and proportions of the character, joint angles, kinematics, sensors, time code: no poses.
 _WITHOUT_POSE = {b"12", b"13", b"20", b"21", b"22", b"23", b"24", b"25"}
-# To ours of (forward, left, up) and, where MVN is set to Y up, of (forward, up, right).
+# Axes to ours of (forward, left, up) and, if MVN is set to Y up, of (forward, up, right).
 _AXES = {
     "z": np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]),
     "y": np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]]),
 }
-_FEWEST = 3  # segments by which a body can be measured
+_FEWEST = 3  # segments needed to measure a body
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -63,12 +63,12 @@ class _Datagram:
     Attributes:
         kind: the protocol's identifier.
         counter: of the sample.
-        place: among the sample's datagrams.
-        last: whether none of the sample's follow.
-        time: [s] of MVN's clock.
-        character: whose segments they are.
-        props: how many of the character's segments are things held.
-        segments: as `_SEGMENTS` lays them out.
+        place: index among the sample's datagrams.
+        last: whether it is the sample's last datagram.
+        time: [s] on MVN's clock.
+        character: number of the character.
+        props: number of the character's segments that are props.
+        segments: in the layout of `_SEGMENTS`.
     """
 
     kind: bytes
@@ -83,7 +83,7 @@ class _Datagram:
 
 @dataclass(slots=True, eq=False)
 class _Sample:
-    """The datagrams of one pose so far, by their place; how many there are once that is known."""
+    """The datagrams of one pose so far, by their index; their number once it is known."""
 
     parts: dict[int, NDArray[np.void]] = field(default_factory=dict)
     count: int | None = None
@@ -95,11 +95,11 @@ class _Sample:
 
 @dataclass(slots=True, eq=False)
 class _Character:
-    """What is known of one character of MVN's.
+    """State of one character in MVN.
 
     Attributes:
-        open: samples that are not whole, by counter.
-        newest: counter of the last whole one.
+        open: incomplete samples, by counter.
+        newest: counter of the last complete sample.
         came: its arrival [s].
         quaternions: arrival [s] of the last MXTP02.
         unit: [m] of its positions.
@@ -117,11 +117,11 @@ class XsensDecoder:
 
     Args:
         fingers: whether the skeleton has the 40 segments of MVN's gloves.
-        up: which axis of MXTP02 is up, "z" or "y".
+        up: the up axis of MXTP02, "z" or "y".
 
     Attributes:
-        refused: datagrams that were malformed, late, repeated, of a kind that is not read, or whose
-            sample never became whole.
+        refused: datagrams that were malformed, late, repeated, of an unsupported kind, or part of a
+            sample that stayed incomplete.
     """
 
     def __init__(self, *, fingers: bool = False, up: str = "z") -> None:
@@ -132,7 +132,7 @@ class XsensDecoder:
         self._characters: dict[int, _Character] = {}
 
     def feed(self, data: bytes, arrival: float) -> Sequence[SkeletonFrame]:
-        """The frame that a datagram, which came at `arrival` [s], completes."""
+        """Return the frame that a datagram, received at `arrival` [s], completes."""
         datagram = _datagram(data)
         if datagram is None:
             self.refused += data[:4] != b"MXTP" or data[4:6] not in _WITHOUT_POSE
@@ -141,7 +141,7 @@ class XsensDecoder:
         if datagram.kind == _QUATERNIONS:
             character.quaternions = arrival
         elif arrival - character.quaternions < 1.0:
-            return ()  # the same poses once more, with less in them
+            return ()  # the same poses with less information
         if self._late(character, datagram.counter, arrival):
             self.refused += 1
             return ()
@@ -162,7 +162,7 @@ class XsensDecoder:
         ]
 
     def _late(self, character: _Character, counter: int, arrival: float) -> bool:
-        """Whether a sample was overtaken by a newer one or came already; a restart is neither."""
+        """Whether a sample is late or repeated; a restart of MVN is neither."""
         behind = character.newest - counter
         if behind < 0:
             return False
@@ -173,7 +173,7 @@ class XsensDecoder:
         return False
 
     def _assemble(self, character: _Character, datagram: _Datagram) -> NDArray[np.void] | None:
-        """The segments of the sample that this datagram makes whole."""
+        """The segments of the sample that this datagram completes, or None."""
         sample = character.open.setdefault(datagram.counter, _Sample())
         if datagram.place in sample.parts:
             self.refused += 1
@@ -194,11 +194,11 @@ class XsensDecoder:
             self.refused += 1
         return None
 
-    @np.errstate(over="ignore", invalid="ignore")  # whatever a damaged packet holds
+    @np.errstate(over="ignore", invalid="ignore")  # values of a damaged packet
     def _joints(
         self, segments: NDArray[np.void], props: int, character: _Character
     ) -> tuple[Array, Array]:
-        """Positions (J, 3) [m] and rotations (J, 4) in our axes, NaN where unknown."""
+        """Positions (J, 3) [m] and rotations (J, 4) in our axes; NaN where unknown."""
         count = len(self.skeleton.names)
         joints, inside = _joint_numbers(segments["id"], props, count)
         positions, rotations = np.full((count, 3), np.nan), np.full((count, 4), np.nan)
@@ -207,7 +207,7 @@ class XsensDecoder:
         if size > 0.0:
             character.unit = 0.01 if size > SMALLEST_IN_CM else 1.0
         positions *= character.unit
-        positions[~(np.abs(positions) < FARTHEST).all(axis=1)] = np.nan  # NaN is not less
+        positions[~(np.abs(positions) < FARTHEST).all(axis=1)] = np.nan  # also where it is NaN
         if "rotation" not in (segments.dtype.names or ()):
             return positions, rotations  # MXTP01, whose axes are ours
         w, *axis = segments["rotation"][inside].astype(np.float64).T
@@ -220,7 +220,7 @@ class XsensDecoder:
 
 
 def _datagram(data: bytes) -> _Datagram | None:
-    """What a datagram holds; None where that is no pose, or other than its header says."""
+    """Decode a datagram; None if it holds no pose or contradicts its header."""
     if len(data) < HEADER.size:
         return None
     tag, counter, place, count, time, who, _, props, _, _, size = HEADER.unpack_from(data)
@@ -235,9 +235,9 @@ def _datagram(data: bytes) -> _Datagram | None:
 
 
 def datagram_length(head: bytes) -> int | None:
-    """Bytes of the datagram that begins with `head`, its 24 bytes of header; None if it is none.
+    """Return the length of the datagram that begins with the 24-byte header `head`, or None.
 
-    MVN left the size of the payload empty before the protocol had one; the items of a pose tell it.
+    Old versions of MVN leave the payload size empty; the number of items gives it for poses.
     """
     tag, _, _, count, _, _, _, _, _, _, size = HEADER.unpack(head)
     if tag[:4] != b"MXTP" or not tag[4:].isdigit():
@@ -250,7 +250,7 @@ def datagram_length(head: bytes) -> int | None:
 
 
 def _size(positions: Array) -> float:
-    """How far a body's segments are from its middle, in the median; 0 where too few are seen."""
+    """Median distance of a body's segments from their middle; 0 if too few are seen."""
     seen = positions[np.isfinite(positions).all(axis=1)]
     if len(seen) < _FEWEST:
         return 0.0
@@ -260,7 +260,7 @@ def _size(positions: Array) -> float:
 def _joint_numbers(
     ids: NDArray[np.uint32], props: int, count: int
 ) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """The joint of each segment, and which segments have one: props have none.
+    """Return the joint of each segment, and which segments have one; props have none.
 
     Segments count from 1; those of the fingers begin after the body's and the props.
     """
@@ -277,7 +277,7 @@ def open_device(address: SplitResult) -> LiveStream:
     """Listen at ``xsens://HOST:PORT?transport=udp|tcp&fingers=on|off&up=z|y``.
 
     Raises:
-        InputError: the port is taken, or an option is not known.
+        InputError: the port is taken, or an option is unknown.
     """
     known = {
         "transport": one_of("udp", "tcp"),

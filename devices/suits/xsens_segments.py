@@ -1,8 +1,8 @@
 """The segments of Xsens MVN's body: names and order of the protocol, parents, and its T-pose.
 
-A joint is a segment's origin, which is where it hangs on the one before. Source: MVN real-time
-network streaming protocol specification, tables 1 and 2 (segments, finger tracking segments). The
-protocol tells of no lengths beforehand; those of the built-in body stand in for them at rest.
+A joint is the origin of a segment, where it connects to its parent. Source: MVN real-time network
+streaming protocol specification, tables 1 and 2 (segments, finger tracking segments). The protocol
+gives no lengths in advance; the rest pose takes them from the built-in body.
 """
 
 from __future__ import annotations
@@ -26,15 +26,15 @@ _TRUNK: dict[str, JointOnHumanoid] = {
 }
 _ARM = {"Shoulder": "Shoulder", "UpperArm": "UpperArm", "ForeArm": "LowerArm", "Hand": "Hand"}
 _LEG = {"UpperLeg": "UpperLeg", "LowerLeg": "LowerLeg", "Foot": "Foot", "Toe": "Toes"}
-_CARPUS = 0.2  # of the way from the wrist to the middle finger's knuckle
-_METACARPAL = 0.35  # of the way from the wrist to a finger's knuckle
+_CARPUS = 0.2  # of the distance from the wrist to the middle finger's knuckle
+_METACARPAL = 0.35  # of the distance from the wrist to a finger's knuckle
 
 
 @lru_cache(maxsize=2)
 def xsens_skeleton(*, fingers: bool = False) -> Skeleton:
-    """The 23 segments of the body at rest in a T-pose; with `fingers` the 20 of each hand as well.
+    """Return the 23 segments of the body in a T-pose; with `fingers` also the 20 of each hand.
 
-    Joints are in the order in which MVN numbers segments, left fingers before right ones.
+    Joints are in MVN's order of segments, left fingers before right ones.
     """
     points = dict(_TRUNK)
     for hung_on, limb in (("T8", _ARM), ("Pelvis", _LEG)):

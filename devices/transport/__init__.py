@@ -1,1 +1,1 @@
-"""How bytes arrive: sockets, reader threads, clocks and bounded queues."""
+"""Receiving bytes: sockets, sensor SDKs, reader threads, clocks and bounded queues."""

@@ -1,4 +1,4 @@
-"""A socket bound to a port of this machine, or one line on why there is none and what to do."""
+"""Bind a socket to a port of this machine, or explain in one line why that fails."""
 
 from __future__ import annotations
 
@@ -11,21 +11,24 @@ from devices.errors import InputError
 from devices.transport.port_owner import port_owner
 
 PORTS_TO_TRY = 20
-BACKLOG = 16  # TCP connections that wait to be accepted
+BACKLOG = 16  # TCP connections waiting to be accepted
 
 Protocol = Literal["udp", "tcp"]
 _KINDS = {"udp": socket.SOCK_DGRAM, "tcp": socket.SOCK_STREAM}
 
 
 def bound_socket(host: str, port: int, *, protocol: Protocol, scheme: str) -> socket.socket:
-    """A socket bound to host and port (0 is any free one); one of TCP listens.
+    """Return a socket bound to host and port (0 is any free port); a TCP socket listens.
 
     Args:
-        scheme: what the user wrote before ``://``; error messages suggest an address with it.
+        host: a name or an address of this machine.
+        port: the port.
+        protocol: "udp" or "tcp".
+        scheme: the scheme of the address, for suggestions in error messages.
 
     Raises:
-        InputError: the host is unknown or not this machine's, or the port is taken (the message
-            says by whom and names a free one) or forbidden.
+        InputError: the host is unknown or not this machine, or the port is taken (the message
+            names the process and a free port) or forbidden.
     """
     where = f"{scheme}://{host}:{port}"
     try:
@@ -48,8 +51,8 @@ def bound_socket(host: str, port: int, *, protocol: Protocol, scheme: str) -> so
 
 
 def _bind(bound: socket.socket, target: tuple[object, ...]) -> None:
-    """Bind, also where connections of a show that was there just now are still dying away."""
-    if bound.type == socket.SOCK_STREAM and os.name == "posix":  # elsewhere it lets others in
+    """Bind, also while connections of an earlier process on this port are still closing."""
+    if bound.type == socket.SOCK_STREAM and os.name == "posix":  # elsewhere this shares the port
         bound.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     bound.bind(target)
 
@@ -70,7 +73,7 @@ def _reason(error: OSError, host: str, port: int, protocol: Protocol, scheme: st
 
 
 def _free_port(host: str, port: int, protocol: Protocol) -> int | None:
-    """The next port that can be bound."""
+    """The next port that can be bound, or None."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     for candidate in range(port + 1, min(port + 1 + PORTS_TO_TRY, 65536)):
         with socket.socket(family, _KINDS[protocol]) as trial:

@@ -1,26 +1,26 @@
-"""A device's own clock on the host's monotonic clock."""
+"""Map times of a device's clock to the host's monotonic clock."""
 
 from __future__ import annotations
 
 import math
 
-WINDOW = 2.0  # [s] of arrivals that one minimum is taken over
-FARTHEST = 0.5  # [s] a mapped time may lie before its arrival
-LARGEST = 1e11  # [s] of a device clock: 3000 years; more has no milliseconds left in a float64
-STEP_BACK = 0.25  # [s] that no packet is late by on a local network
+WINDOW = 2.0  # [s] of arrivals over which a minimum is taken
+FARTHEST = 0.5  # [s] largest plausible delay between mapped time and arrival
+LARGEST = 1e11  # [s] of a device clock: 3000 years; a larger float64 resolves no milliseconds
+STEP_BACK = 0.25  # [s] larger than the delay of any packet on a local network
 
 
 class ClockMap:
-    """Maps device times to host times by the least delay seen lately.
+    """Maps device times to host times by the smallest recent delay.
 
-    Packets come late by a delay that changes, never early; so the least difference between arrival
-    and device time is the best estimate of the clocks' offset (the minimum filter of NTP, RFC 5905,
-    section 10). It is taken over the last `WINDOW` to twice `WINDOW` seconds, so that clocks may
-    drift apart. A device clock that jumps, in either direction, and a sender that begins again
-    start the estimate anew.
+    Packets are delayed by a varying time and never come early, so the smallest difference between
+    arrival and device time is the best estimate of the clock offset (the minimum filter of NTP,
+    RFC 5905, section 10). It is taken over the last `WINDOW` to twice `WINDOW` seconds, so the
+    clocks may drift. The estimate restarts when the device clock jumps, in either direction, or
+    the sender restarts.
 
     Attributes:
-        jumps: how often it started anew.
+        jumps: number of restarts of the estimate.
     """
 
     def __init__(self) -> None:
@@ -31,12 +31,12 @@ class ClockMap:
         self._last_host = -math.inf
 
     def host_time(self, device: float, arrival: float) -> float:
-        """The host's time [s] of what the device stamped `device` [s] and that came at `arrival`.
+        """Return the host time [s] of a device time [s] that was received at `arrival` [s].
 
-        Never after the arrival, and never before what was returned last while arrivals do not
-        fall. A stamp that is no number, or as large as none is, is taken for the arrival.
+        It is never later than the arrival, and never earlier than the previous result while
+        arrivals do not fall. A device time that is not finite or too large yields the arrival.
         """
-        if not abs(device) < LARGEST:  # NaN is not
+        if not abs(device) < LARGEST:  # also for NaN
             self._last_host = max(self._last_host, arrival)
             return arrival
         offset = arrival - device
@@ -54,7 +54,7 @@ class ClockMap:
         return self._last_host
 
     def _jumped(self, device: float, offset: float) -> bool:
-        """Whether the device's clock was set, rather than the packet late or the clock adrift."""
+        """Whether the device clock was set, as opposed to a late packet or clock drift."""
         least = min(self._earlier, self._current)
         return abs(offset - least) > FARTHEST or self._last_device - device > STEP_BACK
 

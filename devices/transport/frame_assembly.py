@@ -1,4 +1,4 @@
-"""Which messages make one frame, in protocols that have no mark for it (VMC, VRChat)."""
+"""Assemble messages to frames in protocols without a frame mark (VMC, VRChat, NI mate)."""
 
 from __future__ import annotations
 
@@ -7,24 +7,23 @@ from collections import deque
 from collections.abc import Iterable
 from statistics import median
 
-HALF = 0.5  # of a period without anything ends a frame
-# [s] that end one at least and at most. What waited in a queue comes faster than it was sent, and
-# says nothing of the period; senders of more than 125 Hz are told by the parts that come again.
+HALF = 0.5  # periods of silence that end a frame
+# [s] bounds of that silence. Queued messages come faster than they were sent, and say nothing about
+# the period; above 125 Hz, frames end because a part repeats.
 SHORTEST_GAP, LONGEST_GAP = 0.004, 0.25
 FEWEST_PERIODS, KEPT_PERIODS = 2, 9
-REMEMBERED_FRAMES = 30  # a part that none of these had is not waited for
+REMEMBERED_FRAMES = 30  # a part that is missing in this many frames is no longer expected
 
 
 class FrameAssembly:
-    """Says when the parts that came make a frame.
+    """Decides when the received parts make a frame.
 
-    A frame ends (a) when a time or status comes after parts, (b) when a part comes again, (c) when
-    nothing has come for half a period, as the protocol's receivers do it; and, so that nobody waits
-    for the next frame to know that this one is whole, (d) at the end of the datagram with which
-    every part is there that lately was.
+    A frame ends (a) when a time or status message follows parts, (b) when a part repeats, (c) after
+    half a period of silence, as in the protocol's receivers; and, so that a complete frame need not
+    wait for the next one, (d) at the end of the datagram that completes the set of recent parts.
 
     Attributes:
-        parts: the parts of the frame that is being put together.
+        parts: the parts of the frame being assembled.
         newest: arrival [s] of its last part.
     """
 
@@ -40,33 +39,33 @@ class FrameAssembly:
 
     @property
     def gap(self) -> float:
-        """The time [s] between two messages by which they are of different frames."""
+        """Silence [s] between two messages after which they belong to different frames."""
         if math.isnan(self._gap):
             self._gap = min(max(HALF * median(self._periods), SHORTEST_GAP), LONGEST_GAP)
         return self._gap
 
     def add(self, part: int, arrival: float) -> None:
-        """Take in a part that came at `arrival` [s]."""
+        """Add a part received at `arrival` [s]."""
         self.add_all((part,), arrival)
 
     def add_all(self, parts: Iterable[int], arrival: float) -> None:
-        """Take in parts that came at `arrival` [s]."""
+        """Add parts received at `arrival` [s]."""
         if not self.parts:
             self._began = arrival
         self.parts.update(parts)
         self.newest = arrival
 
     def overdue(self, now: float) -> bool:
-        """Whether nothing has come for so long that the frame is over: rule (c)."""
+        """Whether the silence until `now` [s] has ended the frame: rule (c)."""
         return bool(self.parts) and now - self.newest > self.gap
 
     @property
     def whole(self) -> bool:
-        """Whether every part is there that one of the last frames had: rule (d)."""
+        """Whether every part that a recent frame had is present: rule (d)."""
         return bool(self._last_in) and self._last_in.keys() <= self.parts
 
     def end(self) -> None:
-        """The frame is over; the next part begins another."""
+        """End the frame; the next part begins another."""
         self._number += 1
         self._last_in.update(dict.fromkeys(self.parts, self._number))
         if len(self._last_in) > len(self.parts):
@@ -75,16 +74,16 @@ class FrameAssembly:
         if self._previous is not None:
             self._periods.append(self._began - self._previous)
             known = len(self._periods) >= FEWEST_PERIODS
-            self._gap = math.nan if known else SHORTEST_GAP  # found when it is asked for
+            self._gap = math.nan if known else SHORTEST_GAP  # computed when it is needed
         self._previous = self._began
         self.parts = set()
 
     def discard(self) -> None:
-        """The parts are those of the last frame once more: no frame."""
+        """Discard the parts, which repeat the last frame."""
         self.parts = set()
 
     def restart(self) -> None:
-        """Another sender may follow: expect nothing of it."""
+        """Expect nothing of the next sender, which may be another one."""
         self._last_in.clear()
         self._periods.clear()
         self._gap = SHORTEST_GAP

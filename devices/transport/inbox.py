@@ -1,4 +1,4 @@
-"""The bounded hand-over of frames from a device's reader thread to the frame loop."""
+"""Bounded queue of frames from a device's reader thread to the frame loop."""
 
 from __future__ import annotations
 
@@ -9,14 +9,14 @@ from collections.abc import Iterable
 from devices.skeleton import SkeletonFrame
 
 CAPACITY = 4096
-"""Frames that wait at most: 17 s of four performers at 60 Hz, should the loop stand that long."""
+"""Largest number of waiting frames: 17 s of four performers at 60 Hz."""
 
 
 class Bell:
-    """Wakes the one thread that waits for it, and stays rung until it is stilled.
+    """Wakes the one thread that waits for it; it stays rung until it is stilled.
 
-    It is a bare lock, free while it is rung. `threading.Event` runs thirty lines of Python on
-    either side of the hand-over, which are fetched anew for every frame.
+    It is a plain lock, free while it is rung. `threading.Event` runs thirty lines of Python on each
+    side, which are loaded into the caches again for every frame.
     """
 
     def __init__(self) -> None:
@@ -24,27 +24,27 @@ class Bell:
         self._lock.acquire()
 
     def ring(self) -> None:
-        """Wake who waits; one thread at a time may ring or still."""
+        """Wake the waiting thread; only one thread at a time may ring or still."""
         if self._lock.locked():
             self._lock.release()
 
     def still(self) -> None:
-        """Let the next one wait."""
+        """Make the next `wait` block."""
         self._lock.acquire(blocking=False)
 
     def wait(self, seconds: float) -> bool:
-        """Sleep until it is rung, at most so long, and still it; whether it was rung."""
+        """Wait at most `seconds` until it is rung, and still it; return whether it was rung."""
         return self._lock.acquire(timeout=seconds)
 
 
 class Inbox:
-    """Frames in the order in which they came; one thread puts, another takes, neither waits long.
+    """Frames in order of arrival; one thread puts, another takes, neither blocks for long.
 
     Args:
-        capacity: how many frames are kept; when one more comes the oldest is dropped and counted.
+        capacity: number of frames that are kept; beyond it the oldest is dropped and counted.
 
     Attributes:
-        dropped: frames that nobody took in time.
+        dropped: frames that were discarded before they were taken.
     """
 
     def __init__(self, capacity: int = CAPACITY) -> None:
@@ -63,11 +63,11 @@ class Inbox:
                 self._filled.ring()
 
     def wait(self, seconds: float) -> bool:
-        """Sleep until a frame is there, at most so long; whether one is."""
+        """Wait at most `seconds` for a frame; return whether there is one."""
         return bool(self._frames) or self._filled.wait(seconds)
 
     def take(self) -> list[SkeletonFrame]:
-        """Every frame since the last call, oldest first."""
+        """Return every frame since the last call, oldest first."""
         with self._lock:
             frames = list(self._frames)
             self._frames.clear()

@@ -1,4 +1,4 @@
-"""A live device as a stream: a transport's reader thread, decoders, and an inbox between."""
+"""A live device as a stream: a transport on a reader thread, decoders per sender, and an inbox."""
 
 from __future__ import annotations
 
@@ -14,44 +14,45 @@ from devices.transport.senders import Decoder, Senders
 from devices.transport.traffic import Rhythm, Traffic
 
 Deliver = Callable[[bytes, float, Hashable], None]
-"""Takes one message, its host monotonic arrival [s], and who sent it ("" where that is one)."""
+"""Takes one message, its arrival on the host's monotonic clock [s], and its sender ("" if only
+one)."""
 
 PATIENCE = 2.0  # [s] that closing waits for the reader thread
 
 
 class Transport(Protocol):
-    """Where messages come from: a socket, a library's queue, an SDK."""
+    """A source of messages: a socket, a library's queue, an SDK."""
 
     @property
     def dropped(self) -> int:
-        """Messages that this machine lost before they were read, as far as that is known."""
+        """Messages that this machine lost before they were read, as far as known."""
         ...
 
     @property
     def trouble(self) -> str:
-        """One line on what is wrong with the connection just now, or an empty one."""
+        """One line that describes a current fault of the connection, or an empty one."""
         ...
 
     def run(self, deliver: Deliver) -> None:
-        """Deliver messages, on the reader thread, until it is closed.
+        """Deliver messages on the reader thread until it is closed.
 
         Raises:
-            InputError: nothing can come any more.
+            InputError: no message can come any more.
         """
         ...
 
     def close(self) -> None:
-        """Let `run` return soon and release what was opened; may be called twice."""
+        """Make `run` return soon and release resources; may be called twice."""
         ...
 
 
 class LiveStream:
-    """A `SkeletonStream` over a transport; one thread receives, stamps, decodes and hands over.
+    """A `SkeletonStream` over a transport; one thread receives, stamps, decodes and queues.
 
     Args:
-        transport: already open, so that what cannot be opened was said before.
+        transport: already open.
         make_decoder: makes the decoder of each sender.
-        capacity: frames that wait for a poll at most.
+        capacity: largest number of frames that wait for a poll.
     """
 
     def __init__(
@@ -85,7 +86,7 @@ class LiveStream:
 
     @property
     def traffic(self) -> Traffic:
-        """What has come so far."""
+        """Counters of the received data."""
         rate, jitter = self._rhythm.measure(time.perf_counter())
         return Traffic(
             packets=self._packets,
@@ -99,19 +100,19 @@ class LiveStream:
         )
 
     def tap(self, listener: Callable[[SkeletonFrame], None]) -> None:
-        """Show every frame from now on to `listener`, in order, as it comes, on the reader thread.
+        """Pass every frame from now on to `listener`, in order, on the reader thread.
 
-        A recorder listens here: before the inbox, which drops what the loop is too slow for. The
-        listener must neither wait nor raise.
+        A recorder listens here, before the inbox, which drops frames if the frame loop is slow. The
+        listener must not wait or raise.
         """
         self._listeners = (*self._listeners, listener)
 
     def wait(self, seconds: float) -> bool:
-        """Sleep until a frame is there, at most so long; whether one is."""
+        """Wait at most `seconds` for a frame; return whether there is one."""
         return self._inbox.wait(seconds)
 
     def poll(self) -> Sequence[SkeletonFrame]:
-        """Every frame that has come since the last poll, oldest first; never blocks."""
+        """Return the frames since the last poll, oldest first; never blocks."""
         return [] if self._closed else self._inbox.take()
 
     def close(self) -> None:
@@ -140,7 +141,7 @@ class LiveStream:
         self._last_seen = arrival
         try:
             frames = self._senders.feed(data, arrival, source)
-        except Exception as error:  # a show must outlive a mistake of ours in a decoder
+        except Exception as error:  # a defect in a decoder must not end the show
             self._failed += 1
             self._trouble = f"a message could not be decoded ({error!r}); please report this"
             return

@@ -1,4 +1,4 @@
-"""Who holds a UDP or TCP port of this machine, as far as Linux's /proc tells."""
+"""Find the process that holds a UDP or TCP port of this machine, from Linux's /proc."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ class Owner:
 
 
 def port_owner(port: int, protocol: Literal["udp", "tcp"] = "udp") -> Owner | None:
-    """The process that is bound to `port`; None where nobody is or nothing tells."""
+    """Return the process bound to `port`, or None if there is none or it is unknown."""
     inodes = set(_inodes(port, protocol))
     if not inodes:
         return None
-    wanted = {f"socket:[{inode}]" for inode in inodes}
+    links = {f"socket:[{inode}]" for inode in inodes}
     for folder in PROC.glob("[0-9]*"):
         try:
-            if any(str(entry.readlink()) in wanted for entry in (folder / "fd").iterdir()):
+            if any(str(entry.readlink()) in links for entry in (folder / "fd").iterdir()):
                 name = (folder / "comm").read_text(encoding="utf-8", errors="replace").strip()
                 return Owner(int(folder.name), name)
         except OSError:
-            continue  # gone by now, or somebody else's
+            continue  # the process has ended, or belongs to another user
     return None
 
 
 def _inodes(port: int, protocol: str) -> Iterator[str]:
-    """Socket inodes from /proc/net, whose rows hold "address:port" in hexadecimal."""
+    """Yield socket inodes from /proc/net, whose rows hold "address:port" in hexadecimal."""
     for table in (protocol, f"{protocol}6"):
         try:
             rows = (PROC / "net" / table).read_text(encoding="ascii").splitlines()[1:]

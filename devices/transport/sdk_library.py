@@ -1,4 +1,4 @@
-"""Loading a maker's shared library, and a reader thread's loop over what it gives."""
+"""Sensors with a maker's shared library: load the library, read frames, reopen lost sensors."""
 
 from __future__ import annotations
 
@@ -13,42 +13,42 @@ from typing import Protocol
 from devices.errors import InputError
 from devices.transport.live_stream import Deliver
 
-RETRY = 1.0  # [s] until a sensor that was lost is opened again
+RETRY = 1.0  # [s] until a lost sensor is opened again
 _BESIDE_ITSELF = 0x8  # LOAD_WITH_ALTERED_SEARCH_PATH
 
 
 class SensorLostError(Exception):
-    """The sensor answers no more; the message is one line on what to do."""
+    """The sensor no longer answers; the message is one line with what to do."""
 
 
 class SensorSource(Protocol):
-    """An open sensor: the thin part that calls the maker's library."""
+    """An open sensor: the thin layer that calls the maker's library."""
 
     def read(self) -> bytes | None:
-        """One frame's bytes, or None when none came within about 0.1 s.
+        """Return the bytes of one frame, or None if none came within about 0.1 s.
 
         Raises:
-            SensorLostError: nothing will come until it is opened again.
+            SensorLostError: nothing will come until the sensor is opened again.
         """
         ...
 
     def close(self) -> None:
-        """Give the sensor back."""
+        """Release the sensor."""
         ...
 
 
 class SensorTransport:
-    """A transport over a sensor; one that is unplugged is opened again when it is back.
+    """A transport over a sensor; an unplugged sensor is opened again when it returns.
 
     Args:
-        open_sensor: opens it; raises InputError where it cannot be.
+        open_sensor: opens the sensor; raises InputError if that fails.
 
     Attributes:
-        dropped: always 0; what a library drops it does not tell.
-        trouble: why nothing comes just now.
+        dropped: always 0; the libraries do not report dropped frames.
+        trouble: one line that explains why nothing comes now, or an empty one.
 
     Raises:
-        InputError: it cannot be opened now.
+        InputError: the sensor cannot be opened.
     """
 
     dropped = 0
@@ -60,7 +60,7 @@ class SensorTransport:
         self._source: SensorSource | None = open_sensor()
 
     def run(self, deliver: Deliver) -> None:
-        """Deliver each frame's bytes with its arrival until it is closed."""
+        """Deliver the bytes and arrival of each frame until closed."""
         try:
             while not self._closing.is_set():
                 if self._source is None:
@@ -71,7 +71,7 @@ class SensorTransport:
             self._release()
 
     def close(self) -> None:
-        """Let `run` return soon; it gives the sensor back on its own thread."""
+        """Make `run` return soon; it releases the sensor on its own thread."""
         self._closing.set()
 
     def _read(self, source: SensorSource, deliver: Deliver) -> None:
@@ -100,10 +100,10 @@ class SensorTransport:
 
 
 def load_library(names: Sequence[str], missing: str) -> ctypes.CDLL:
-    """The first of the libraries `names` that this machine has.
+    """Return the first of the libraries `names` that this machine has.
 
-    On Windows a name is looked for in the system's folder and along PATH, but never in the current
-    folder, where anybody may have put it; what the library needs may lie beside it.
+    On Windows a name is searched in the system's folder and along PATH, but never in the current
+    folder, which may hold foreign files; dependencies may lie beside the library.
 
     Raises:
         InputError: there is none; the message is `missing`.

@@ -1,4 +1,4 @@
-"""Several senders on one port, told apart: each has a decoder and performers of its own."""
+"""Separate several senders on one port: each has its own decoder and performer numbers."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from devices.skeleton import Skeleton, SkeletonFrame
 
 MOST_SENDERS = 8
 PERFORMERS_A_SENDER = 100
-SILENT = 0.5  # [s] after which a sender's place goes to another of the same machine
-FORGOTTEN = 10.0  # [s] after which it goes to anybody
+SILENT = 0.5  # [s] after which a sender's slot goes to another sender of the same machine
+FORGOTTEN = 10.0  # [s] after which it goes to any sender
 MOST_KNOWN = 256
 
 
 class Decoder(Protocol):
-    """Turns one sender's messages into frames: no sockets, no clock, no exception on any bytes."""
+    """Converts one sender's messages to frames: no sockets, no clock, no exception on any bytes."""
 
     @property
     def skeleton(self) -> Skeleton:
@@ -26,17 +26,17 @@ class Decoder(Protocol):
 
     @property
     def refused(self) -> int:
-        """Messages, or parts of them, that were not understood."""
+        """Messages, or parts of them, that could not be decoded."""
         ...
 
     def feed(self, data: bytes, arrival: float) -> Sequence[SkeletonFrame]:
-        """Take in one message that came at `arrival` [s]; the frames that it completes."""
+        """Return the frames that a message, received at `arrival` [s], completes."""
         ...
 
 
 @dataclass(slots=True)
-class _Place:
-    """One sender's place: who holds it, when it was last heard [s], how many messages it sent."""
+class _Slot:
+    """A sender's slot: its holder, when it was last heard [s], how many messages it sent."""
 
     source: Hashable
     decoder: Decoder
@@ -49,11 +49,11 @@ def _machine(source: Hashable) -> Hashable:
 
 
 class Senders:
-    """Feeds each sender's messages to a decoder of its own, and numbers the performers apart.
+    """Passes each sender's messages to its own decoder, and gives performers distinct numbers.
 
-    A sender is an address and a port. One that starts again comes from another port: it takes the
-    place, and so the performers, of one of its machine that has gone silent. Where every packet
-    comes from a new port, as some scripts send them, they are taken for one sender.
+    A sender is an address and a port. A restarted sender has another port: it takes the slot, and
+    so the performers, of a silent sender on the same machine. If every packet comes from a new
+    port, as with some scripts, the packets count as one sender.
 
     Args:
         make_decoder: makes the decoder of a new sender.
@@ -68,60 +68,60 @@ class Senders:
         self._make_decoder = make_decoder
         first = make_decoder()
         self.skeleton = first.skeleton
-        self._places: list[_Place] = [_Place(None, first, -1e300)]
+        self._slots: list[_Slot] = [_Slot(None, first, -1e300)]
         self._known: OrderedDict[Hashable, None] = OrderedDict()
 
     @property
     def decoders(self) -> list[Decoder]:
         """The decoder of each sender so far."""
-        return [place.decoder for place in self._places]
+        return [slot.decoder for slot in self._slots]
 
     @property
     def refused(self) -> int:
-        """Messages, or parts of them, that were not understood, or came from one too many."""
+        """Messages, or parts of them, that could not be decoded, or came from surplus senders."""
         return self.crowded_out + sum(decoder.refused for decoder in self.decoders)
 
     def feed(self, data: bytes, arrival: float, source: Hashable = "") -> Sequence[SkeletonFrame]:
-        """Take in one message of `source`; the frames that it completes."""
+        """Return the frames that a message of `source` completes."""
         number = self._number(source, arrival)
-        self._know(source)
+        self._remember(source)
         if number is None:
             self.crowded_out += 1
             return ()
-        place = self._places[number]
-        place.heard = arrival
-        place.messages += 1
-        frames = place.decoder.feed(data, arrival)
+        slot = self._slots[number]
+        slot.heard = arrival
+        slot.messages += 1
+        frames = slot.decoder.feed(data, arrival)
         if number == 0:
             return frames
         base = number * PERFORMERS_A_SENDER
         return [replace(frame, performer=base + frame.performer) for frame in frames]
 
     def _number(self, source: Hashable, arrival: float) -> int | None:
-        for number, place in enumerate(self._places):
-            if place.source == source:
+        for number, slot in enumerate(self._slots):
+            if slot.source == source:
                 return number
-        for number, place in enumerate(self._places):
-            if self._free(place, source, arrival):
-                place.source, place.messages = source, 0
+        for number, slot in enumerate(self._slots):
+            if self._free(slot, source, arrival):
+                slot.source, slot.messages = source, 0
                 return number
-        if len(self._places) == MOST_SENDERS:
+        if len(self._slots) == MOST_SENDERS:
             return None
-        self._places.append(_Place(source, self._make_decoder(), arrival))
-        return len(self._places) - 1
+        self._slots.append(_Slot(source, self._make_decoder(), arrival))
+        return len(self._slots) - 1
 
-    def _free(self, place: _Place, source: Hashable, arrival: float) -> bool:
-        """Whether a sender that has no place may have this one."""
-        silence = arrival - place.heard
+    def _free(self, slot: _Slot, source: Hashable, arrival: float) -> bool:
+        """Whether a sender without a slot may take this one."""
+        silence = arrival - slot.heard
         if silence > FORGOTTEN:
             return True
-        if _machine(place.source) != _machine(source):
+        if _machine(slot.source) != _machine(source):
             return False
-        # Two senders of one machine: each of them is heard again from the same port. Only where
-        # nobody ever is does the next port go on where the last one stopped.
-        return silence > SILENT or (place.messages == 1 and source not in self._known)
+        # Two senders of one machine are each heard again from the same port. A new port continues
+        # the last one only if no port is ever heard twice.
+        return silence > SILENT or (slot.messages == 1 and source not in self._known)
 
-    def _know(self, source: Hashable) -> None:
+    def _remember(self, source: Hashable) -> None:
         self._known[source] = None
         self._known.move_to_end(source)
         if len(self._known) > MOST_KNOWN:

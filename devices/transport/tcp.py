@@ -1,7 +1,7 @@
-"""Messages that come as TCP streams: we listen, senders connect, and a header tells how long.
+"""Receive messages as TCP streams: senders connect to us, and a header gives each length.
 
-All connections are read by one thread. What one of them does, be it silence, a reset, an end in
-the middle of a message, or bytes that are no message, is no matter to the others.
+One thread reads all connections. Whatever happens on one of them (silence, a reset, an end in the
+middle of a message, invalid bytes) does not affect the others.
 """
 
 from __future__ import annotations
@@ -18,23 +18,23 @@ from devices.transport.bound_socket import bound_socket
 from devices.transport.live_stream import Deliver
 from devices.transport.senders import FORGOTTEN, MOST_SENDERS
 
-LONGEST = 1 << 20  # bytes of a message, or a header that states more is not believed
-CHUNK = 1 << 14  # bytes that are read from one connection before the others have their turn
-WAIT = 0.1  # [s] after which the reader looks whether it is closed
-SLICE = 0.004  # [s] of work without a pause after which the reader pauses for as long
-IDLE = 0.0002  # [s] of waiting for bytes that count as a pause
-# A machine that lost its power says no goodbye: asked after 2 s of silence, it is gone after 5.
+LONGEST = 1 << 20  # bytes of a message; a header that states more is invalid
+CHUNK = 1 << 14  # bytes read from one connection before the others have their turn
+WAIT = 0.1  # [s] between checks whether the reader is closed
+SLICE = 0.004  # [s] of work without a pause, after which the reader pauses for as long
+IDLE = 0.0002  # [s] of waiting for bytes that counts as a pause
+# A machine that loses power does not close its connections: probed after 2 s, closed after 5 s.
 _KEEP_ALIVE = {"TCP_KEEPIDLE": 2, "TCP_KEEPINTVL": 1, "TCP_KEEPCNT": 3}
 
 
 @dataclass(frozen=True, slots=True)
 class Framing:
-    """How a stream is cut into messages, each of which begins with a header.
+    """How a stream is cut into messages that each begin with a header.
 
     Attributes:
-        name: of the protocol, for people.
+        name: of the protocol, for error messages.
         header: bytes of a header.
-        length: bytes of a whole message, by its header; None where that is no header.
+        length: returns the bytes of a whole message from its header; None for an invalid header.
     """
 
     name: str
@@ -43,7 +43,7 @@ class Framing:
 
 
 def take_messages(data: bytearray, framing: Framing) -> tuple[list[bytes], bool]:
-    """The whole messages at the front of `data`, taken off it; and whether the rest may be one."""
+    """Remove the whole messages from the front of `data`; also return whether the rest is valid."""
     messages: list[bytes] = []
     start = 0
     sound = True
@@ -65,14 +65,14 @@ class _Connection:
     """One sender.
 
     Attributes:
-        stream: does not block.
-        name: host and port, for people.
-        source: its machine, and the lowest number that no other connection of it has: a sender that
-            connects again is the same one, with the same decoder and performers. Not the tuple of
-            an address, since `Senders` lets senders of datagrams take each other's places.
-        heard: when it connected or its newest bytes came [s].
+        stream: non-blocking socket.
+        name: host and port, for error messages.
+        source: its machine, and the lowest number that no other connection of it has. A sender
+            that reconnects is the same sender, with the same decoder and performers. It is not the
+            address tuple, since `Senders` lets datagram senders take over each other's slots.
+        heard: time [s] of the connection or of its newest bytes.
         data: the beginning of a message.
-        vouched: whether a message came.
+        valid: whether a message was received.
     """
 
     stream: socket.socket
@@ -80,30 +80,30 @@ class _Connection:
     source: str
     heard: float
     data: bytearray = field(default_factory=bytearray)
-    vouched: bool = False
+    valid: bool = False
 
 
 class TcpTransport:
-    """A listening TCP socket and the connections that it accepted, `MOST_SENDERS` at most.
+    """A listening TCP socket and its accepted connections, at most `MOST_SENDERS`.
 
-    A connection too many takes the place of the one that was silent longest, if for `FORGOTTEN`
-    seconds, and is closed otherwise. The reader takes at most half of one core's time, as
-    `UdpTransport` does; TCP then holds the senders back.
+    A further connection replaces the one that was silent longest, if for `FORGOTTEN` seconds, and
+    is closed otherwise. The reader takes at most half of one core's time, as `UdpTransport` does;
+    TCP then slows the senders down.
 
     Args:
         host: a name or an address of this machine.
         port: 0 takes any free one.
-        scheme: what the user wrote before ``://``; error messages suggest an address with it.
+        scheme: the scheme of the address, for suggestions in error messages.
         framing: of the protocol.
 
     Attributes:
-        host, port: what it listens at.
+        host, port: the listening address.
         dropped: always 0; TCP loses nothing.
-        trouble: why a connection was closed; empty again with the first message of another.
+        trouble: why a connection was closed; empty after the first message of another.
 
     Raises:
-        InputError: the host is unknown or not this machine's, or the port is taken (the message
-            says by whom and names a free one) or forbidden.
+        InputError: the host is unknown or not this machine, or the port is taken (the message
+            names the process and a free port) or forbidden.
     """
 
     dropped = 0
@@ -118,20 +118,20 @@ class TcpTransport:
         self.host, self.port = self._listener.getsockname()[:2]
 
     def run(self, deliver: Deliver) -> None:
-        """Deliver every message, with the arrival of its last byte, until it is closed."""
+        """Deliver every message, with the arrival of its last byte, until closed."""
         with selectors.DefaultSelector() as selector:
             try:
                 selector.register(self._listener, selectors.EVENT_READ)
                 self._serve(selector, deliver)
             except (OSError, ValueError):
-                if not self._closing.is_set():  # or the listener was closed under our hands
+                if not self._closing.is_set():  # else the listener was closed by `close`
                     raise
             finally:
                 for connection in tuple(self._connections):
                     self._drop(selector, connection)
 
     def close(self) -> None:
-        """Give the port back; `run` then closes the connections; may be called twice."""
+        """Release the port; `run` then closes the connections. May be called twice."""
         self._closing.set()
         self._listener.close()
 
@@ -145,7 +145,7 @@ class TcpTransport:
             for key, _ in ready:
                 if key.data is None:
                     self._accept(selector)
-                elif key.data in self._connections:  # or it just gave way to another
+                elif key.data in self._connections:  # else it was just replaced
                     self._read(selector, key.data, deliver)
             if worked > SLICE:
                 self._closing.wait(worked)
@@ -155,9 +155,9 @@ class TcpTransport:
         try:
             stream, (host, port, *_) = self._listener.accept()
         except (BlockingIOError, ConnectionError):
-            return  # whoever it was has gone
+            return  # the connection is already gone
         except OSError as error:
-            if not self._closing.wait(WAIT):  # it would be ready, and fail, again at once
+            if not self._closing.wait(WAIT):  # it would fail again at once
                 self.trouble = f"a connection cannot be accepted ({error.strerror or error})"
             return
         _prepare(stream)
@@ -174,7 +174,7 @@ class TcpTransport:
         selector.register(stream, selectors.EVENT_READ, connection)
 
     def _make_room(self, selector: selectors.BaseSelector, now: float) -> bool:
-        """Close the connection that was silent longest, if for long; whether that was so."""
+        """Close the connection that was silent longest, if for long; return whether it was."""
         quietest = min(self._connections, key=lambda connection: connection.heard)
         if now - quietest.heard < FORGOTTEN:
             return False
@@ -198,12 +198,12 @@ class TcpTransport:
         connection.heard = time.perf_counter()
         connection.data += data
         messages, sound = take_messages(connection.data, self._framing)
-        if messages and not connection.vouched:
-            connection.vouched = True
+        if messages and not connection.valid:
+            connection.valid = True
             self.trouble = ""
         for message in messages:
             deliver(message, connection.heard, connection.source)
-        if not sound:  # where the next message begins, nothing tells
+        if not sound:  # the start of the next message is unknown
             what = f"sent what is no {self._framing.name} message and was closed; "
             self._drop(selector, connection, what + "set its sender to that, and connect again")
 
@@ -218,9 +218,9 @@ class TcpTransport:
 
 
 def _prepare(stream: socket.socket) -> None:
-    """Let a connection neither block nor outlive its sender for long."""
+    """Make a connection non-blocking, and detect a lost sender."""
     stream.setblocking(False)
     stream.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     for name, value in _KEEP_ALIVE.items():
-        if hasattr(socket, name):  # or the system's own patience holds
+        if hasattr(socket, name):  # else the system's defaults apply
             stream.setsockopt(socket.IPPROTO_TCP, getattr(socket, name), value)

@@ -1,4 +1,4 @@
-"""What has come from a device: how much, how fast, how evenly."""
+"""Statistics of the data from a device: packets, frames, rate, jitter."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 SPAN = 2.0  # [s] over which rate and jitter are measured
-MOST = 1024  # frames that are looked at for them
+MOST = 1024  # frames used for them
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,16 +16,15 @@ class Traffic:
     """The state of a live stream at one moment.
 
     Attributes:
-        packets: messages that came, good or bad.
-        frames: frames made of them.
-        refused: messages, or parts of them, that were not understood and left out.
+        packets: messages received, valid or not.
+        frames: frames made from them.
+        refused: messages, or parts of them, that could not be decoded and were omitted.
         dropped: packets and frames lost on this machine because they came faster than they were
             taken.
-        rate: frames a second over the last two seconds, of all performers together.
-        jitter: [s] mean absolute difference between the time from one frame of a performer to the
-            next and its mean.
+        rate: frames per second over the last two seconds, all performers together.
+        jitter: [s] mean absolute deviation of the time between a performer's frames from its mean.
         last_seen: host monotonic time [s] of the newest packet, NaN before the first.
-        trouble: one line on what is wrong with the connection; empty while all is well.
+        trouble: one line that describes a fault of the connection; empty if there is none.
     """
 
     packets: int = 0
@@ -39,19 +38,19 @@ class Traffic:
 
 
 class Rhythm:
-    """When the newest frames came; one thread notes, any other asks."""
+    """Arrivals of the newest frames; one thread notes them, any other reads them."""
 
     def __init__(self) -> None:
         self._arrivals: deque[tuple[float, int]] = deque(maxlen=MOST)
         self._lock = threading.Lock()
 
     def note(self, arrival: float, performer: int) -> None:
-        """Take in that a frame of `performer` came at `arrival` [s]."""
+        """Note the arrival [s] of a frame of `performer`."""
         with self._lock:
             self._arrivals.append((arrival, performer))
 
     def measure(self, now: float) -> tuple[float, float]:
-        """Frames a second [1/s] and jitter [s] over the last `SPAN` seconds before `now`."""
+        """Return frames per second [1/s] and jitter [s] over the last `SPAN` seconds."""
         with self._lock:
             recent = [entry for entry in self._arrivals if now - entry[0] <= SPAN]
         if len(recent) < 2:

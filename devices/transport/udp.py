@@ -1,4 +1,4 @@
-"""Messages that come as UDP datagrams; a flood of them leaves the rest of the program its time."""
+"""Receive messages as UDP datagrams, with bounded processor time even during a flood."""
 
 from __future__ import annotations
 
@@ -12,33 +12,33 @@ from devices.transport.live_stream import Deliver
 
 LONGEST = 65535  # bytes of a datagram
 QUEUE = 4 << 20  # bytes of unread datagrams that the kernel is asked to keep
-WAIT = 0.1  # [s] after which the reader looks whether it is closed
-SLICE = 0.004  # [s] of work without a pause after which the reader pauses for as long
-IDLE = 0.0002  # [s] of waiting for a datagram that count as a pause
+WAIT = 0.1  # [s] between checks whether the reader is closed
+SLICE = 0.004  # [s] of work without a pause, after which the reader pauses for as long
+IDLE = 0.0002  # [s] of waiting for a datagram that counts as a pause
 _AT_ONCE = getattr(socket, "MSG_DONTWAIT", 0)
-_OVERFLOW = 40  # Linux: SO_RXQ_OVFL, each datagram comes with how many were lost before it
+_OVERFLOW = 40  # Linux: SO_RXQ_OVFL, reports with each datagram how many were lost before it
 
 
 class UdpTransport:
     """A bound UDP socket.
 
-    The reader takes at most half of one core's time: when datagrams come faster than they are
-    decoded, it pauses as long as it has worked, and the kernel drops what its queue cannot keep.
-    Time that it waits for a busy core does not count as work.
+    The reader takes at most half of one core's time: if datagrams come faster than they are
+    decoded, it pauses for as long as it has worked, and the kernel drops what exceeds its queue.
+    Time spent waiting for a busy core does not count as work.
 
     Args:
         host: a name or an address of this machine.
         port: 0 takes any free one.
-        scheme: what the user wrote before ``://``; error messages suggest an address with it.
+        scheme: the scheme of the address, for suggestions in error messages.
 
     Attributes:
-        host, port: what it is bound to.
+        host, port: the bound address.
         dropped: datagrams that the kernel dropped, where the system counts them.
-        trouble: always empty; a socket without a sender is in no trouble.
+        trouble: always empty; silence is no fault of a socket.
 
     Raises:
-        InputError: the host is unknown or not this machine's, or the port is taken (the message
-            says by whom and names a free one) or forbidden.
+        InputError: the host is unknown or not this machine, or the port is taken (the message
+            names the process and a free port) or forbidden.
     """
 
     trouble = ""
@@ -56,10 +56,10 @@ class UdpTransport:
                 self._socket.setsockopt(socket.SOL_SOCKET, _OVERFLOW, 1)
                 self._ancillary = socket.CMSG_SPACE(4)
             except OSError:
-                pass  # not Linux: what the kernel drops is not counted
+                pass  # not Linux: dropped datagrams are not counted
 
     def run(self, deliver: Deliver) -> None:
-        """Deliver every datagram with its arrival and sender's address until it is closed."""
+        """Deliver every datagram with its arrival and the sender's address until closed."""
         worked, since = 0.0, time.thread_time()
         while not self._closing.is_set():
             asked = time.perf_counter()
@@ -69,7 +69,7 @@ class UdpTransport:
             except TimeoutError:
                 continue
             except ConnectionError:
-                continue  # Windows tells here that an earlier answer found nobody
+                continue  # Windows reports here that an earlier answer was not delivered
             except OSError:
                 if self._closing.is_set():
                     return
@@ -82,14 +82,14 @@ class UdpTransport:
                 worked = 0.0
 
     def send(self, data: bytes, target: tuple[str, int]) -> bool:
-        """Send one datagram from the bound port, without waiting; whether the system took it."""
+        """Send one datagram from the bound port, without waiting; return whether it was queued."""
         try:
             return self._socket.sendto(data, _AT_ONCE, target) == len(data)
         except (OSError, OverflowError):
             return False
 
     def close(self) -> None:
-        """Give the port back; may be called twice."""
+        """Release the port; may be called twice."""
         self._closing.set()
         self._socket.close()
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from devices.bridge.stream import BridgeStream
 from devices.bridge.stream import open_device as open_bridge
 from devices.errors import InputError
-from devices.osc.vmc import VmcDecoder
+from devices.osc.vmc_decoder import VmcDecoder
 from devices.skeleton import Skeleton, SkeletonFrame
 from devices.transport.live_stream import LiveStream
 from devices.transport.udp import UdpTransport

@@ -18,7 +18,7 @@ from devices.address import LOOPBACK
 from devices.bridge.messages import LATEST
 from devices.bridge.receiver import BridgeReceiver
 from devices.errors import InputError
-from devices.osc.vmc import VmcDecoder
+from devices.osc.vmc_decoder import VmcDecoder
 from devices.transport.port_owner import port_owner
 from devices.transport.udp import QUEUE
 from replay.builtin import builtin_recording

@@ -18,7 +18,7 @@ from scipy.spatial.transform import Rotation
 from devices.kinect.joints import KINECT_V2
 from devices.osc.nimate import NimateDecoder
 from devices.osc.openni_joints import OPENNI
-from devices.osc.vmc import PERFORMER, VmcDecoder
+from devices.osc.vmc_decoder import PERFORMER, VmcDecoder
 from devices.osc.vrchat import VrchatDecoder
 from devices.suits.rokoko import RokokoDecoder
 from devices.suits.xsens import XsensDecoder

@@ -13,7 +13,8 @@ from devices.bodies.humanoid import FINGERS, SEGMENTS, SIDES, humanoid_skeleton
 from devices.bodies.humanoid_kernels import INFERRED, UNSURE
 from devices.bodies.source_joints import available_presets, source_joints
 from devices.errors import InputError
-from devices.osc.vmc import PERFORMER, VmcDecoder, bone_of_tracker
+from devices.osc.vmc_decoder import PERFORMER, VmcDecoder
+from devices.osc.vmc_trackers import bone_of_tracker
 from devices.skeleton import SkeletonFrame
 from devices.stream import open_stream
 from devices.transport.live_stream import LiveStream

@@ -21,7 +21,7 @@ from pythonosc.udp_client import SimpleUDPClient
 
 from devices.bodies.humanoid import humanoid_skeleton
 from devices.osc.messages import write_bundles, write_message
-from devices.osc.vmc import VmcDecoder
+from devices.osc.vmc_decoder import VmcDecoder
 from devices.skeleton import SkeletonFrame
 from devices.transport.live_stream import LiveStream
 from devices.transport.udp import UdpTransport

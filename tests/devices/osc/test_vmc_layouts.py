@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from devices.bodies.humanoid_kernels import pose_in_world, read_bones
 from devices.osc.messages import BUNDLE, elements, read_packet
-from devices.osc.vmc import MARIONETTE, PERFORMER, VmcDecoder
+from devices.osc.vmc_decoder import MARIONETTE, PERFORMER, VmcDecoder
 from devices.skeleton import SkeletonFrame
 from tests.devices.vmc_sender import HUMAN, at, bones, bundle, message, ok, root, slime
 

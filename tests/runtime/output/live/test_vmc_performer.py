@@ -21,7 +21,7 @@ from devices.mediapipe.joints import (
     POSE_LANDMARKS,
     landmark_skeleton,
 )
-from devices.osc.vmc import VmcDecoder
+from devices.osc.vmc_decoder import VmcDecoder
 from devices.skeleton import Skeleton, SkeletonFrame
 from runtime.driving.performer import Performer
 from runtime.output.live.humanoid_bones import HumanoidBones, humanoid_bones
