@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -81,6 +81,16 @@ class Driver(Protocol):
     @abstractmethod
     def reset(self) -> None:
         """Forget the poses before, as after a cut. What was prepared stays."""
+        ...
+
+    @abstractmethod
+    def snapshot(self) -> Any:
+        """Return everything that is remembered between frames, as an immutable value."""
+        ...
+
+    @abstractmethod
+    def restore(self, state: Any) -> None:
+        """Go back to the state of a snapshot."""
         ...
 
 

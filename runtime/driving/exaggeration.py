@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.kernels.compiled import kernel
-from solvers.signal.springs import Springs
+from solvers.signal.springs import Springs, SpringsState
 
 Array = NDArray[np.float64]
 
@@ -50,6 +50,19 @@ class Strain:
         return np.append(self.limbs, 1.0)[limbs]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ExaggerationState:
+    """The state of an `Exaggeration` between two frames.
+
+    Attributes:
+        springs: of the limbs and the whole.
+        before: time [s], tips (D, 3) [m] and lift [m] of the last frame; None before the first.
+    """
+
+    springs: SpringsState
+    before: tuple[float, Array, float] | None
+
+
 class Exaggeration:
     """Follows how fast a character moves.
 
@@ -67,6 +80,15 @@ class Exaggeration:
         """Forget how the character moved."""
         self._springs = _springs(len(self._sizes))
         self._before = None
+
+    def snapshot(self) -> ExaggerationState:
+        """Return what is remembered between frames."""
+        return ExaggerationState(self._springs.snapshot(), self._before)
+
+    def restore(self, state: ExaggerationState) -> None:
+        """Go back to a snapshot of as many limbs."""
+        self._springs.restore(state.springs)
+        self._before = state.before
 
     def strain(self, time: float, tips: Array, lift: float, amount: float) -> Strain:
         """How far the character is stretched at a moment.

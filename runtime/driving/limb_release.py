@@ -8,6 +8,7 @@ that it is carried by its own surface, and neither tears off nor snaps back.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,25 @@ TAKE_HOLD = 0.5  # [s] and back
 LEVELS = 16  # of firmness; going from one to the next costs a factor
 FIRMEST, LOOSEST = 10.0, 1e-3  # weights of soft handles
 LONGEST_STEP = 0.1  # [s] that a frame may count for
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LimbReleaseState:
+    """The state of a `LimbRelease` between two frames, for each of D limbs.
+
+    Attributes:
+        weights: (D,) of the handles.
+        firmness: (D,) in [0, 1].
+        unseen: (D,) [s] since each was last seen.
+        is_firm: whether every limb is firm and seen.
+        time: [s] of the last frame.
+    """
+
+    weights: Array
+    firmness: Array
+    unseen: Array
+    is_firm: bool
+    time: float
 
 
 class LimbRelease:
@@ -45,6 +65,17 @@ class LimbRelease:
         self._unseen = np.zeros(self._count)
         self._is_firm = True  # every limb, and seen
         self._time = math.nan
+
+    def snapshot(self) -> LimbReleaseState:
+        """Return what is remembered between frames."""
+        return LimbReleaseState(
+            self.weights, self._firmness.copy(), self._unseen, self._is_firm, self._time
+        )
+
+    def restore(self, state: LimbReleaseState) -> None:
+        """Go back to a snapshot of as many limbs."""
+        self.weights, self._firmness = state.weights, state.firmness.copy()
+        self._unseen, self._is_firm, self._time = state.unseen, state.is_firm, state.time
 
     def follow(self, time: float, seen: NDArray[np.bool_]) -> bool:
         """Take in at `time` [s] which limbs are seen (D,); whether a weight has changed."""

@@ -7,6 +7,7 @@ through, a comfortable pose becomes the rest state, and from there the motion is
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from runtime.driving.drivers import DriverFactory
 from runtime.driving.mapping import Mapping
 from runtime.driving.performer import Performer, Pose, Rest, rest_state
 from runtime.driving.polyline_driver import PolylineDriver
-from runtime.driving.puppet_match import Choices, PuppetMatch
+from runtime.driving.puppet_match import Choices, PuppetMatch, PuppetMatchState
 from runtime.puppet.puppet import Puppet
 from solvers.retarget.abstraction import simplify
 from solvers.retarget.posture import most_different
@@ -27,6 +28,23 @@ TRIED = 16  # poses of a rehearsal that the puppets try: those that differ most
 
 Array = NDArray[np.float64]
 View = Callable[[], Array]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class MatchSessionState:
+    """The state of a `MatchSession` between two frames.
+
+    Attributes:
+        matching: whether a match is looked for.
+        since: [s] when the match shown was shown first; NaN if no pose is struck.
+        before: the performer's last pose.
+        matches: of each puppet.
+    """
+
+    matching: bool
+    since: float
+    before: Pose | None
+    matches: tuple[PuppetMatchState, ...]
 
 
 class MatchSession:
@@ -75,6 +93,17 @@ class MatchSession:
         ]
         self._since = float("nan")
         self._before: Pose | None = None
+
+    def snapshot(self) -> MatchSessionState:
+        """Return what is remembered between frames; puppets and performer have their own."""
+        matches = tuple(match.snapshot() for match in self._matches)
+        return MatchSessionState(self.matching, self._since, self._before, matches)
+
+    def restore(self, state: MatchSessionState) -> None:
+        """Go back to a snapshot."""
+        self.matching, self._since, self._before = state.matching, state.since, state.before
+        for match, own in zip(self._matches, state.matches, strict=True):
+            match.restore(own)
 
     @property
     def mappings(self) -> list[Mapping]:

@@ -17,15 +17,15 @@ from devices.skeleton import Skeleton
 from runtime.characters.character import Character
 from runtime.driving.driven_chains import DrivenChains
 from runtime.driving.driver import Highlight, MappedDriver, Needs
-from runtime.driving.exaggeration import Exaggeration, Strain
-from runtime.driving.limb_release import LimbRelease
+from runtime.driving.exaggeration import Exaggeration, ExaggerationState, Strain
+from runtime.driving.limb_release import LimbRelease, LimbReleaseState
 from runtime.driving.mapping import Mapping
 from runtime.driving.performer import Pose, Rest
 from runtime.driving.root_motion import RootMotion, chain_length, legs_of, root_motion
 from runtime.driving.targets import HandleTargets, PosedNodes, Targets
 from runtime.puppet.bound_skeleton import BoundSkeleton
 from runtime.puppet.deformable_surface import DeformableSurface
-from solvers.retarget.chain_retargets import ChainRetargets
+from solvers.retarget.chain_retargets import ChainRetargets, ChainRetargetsState
 from solvers.retarget.polyline_motion import map_chain
 
 Array = NDArray[np.float64]
@@ -34,10 +34,45 @@ STRAIGHT_ON = np.eye(3)  # the view of a capture device
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class LinkState:
+    """What drives, and what its parts remember between frames: see `_Link`."""
+
+    mapping: Mapping
+    view: Array
+    rest: Rest
+    retargets: ChainRetargetsState
+    exaggeration: ExaggerationState
+    limb_release: LimbReleaseState
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PolylineState:
+    """The state of a `PolylineDriver` between two frames.
+
+    Attributes:
+        mapping: the mapping that is shown.
+        view: (3, 3) of the stage when it was shown.
+        gains: (D,) of the drives.
+        positions: (K, 3) [m] the nodes, for the highlights.
+        weights: (A,) how firmly each anchor is held.
+        link: what drives; None if nothing does.
+    """
+
+    mapping: Mapping
+    view: Array
+    gains: Array
+    positions: Array
+    weights: Array
+    link: LinkState | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class _Link:
     """A mapping from one rest state on, and what its parts remember between frames.
 
     Attributes:
+        mapping: what drives.
+        view: (3, 3) rotation from the stage to the camera when the driving began.
         rest: the performer's rest state.
         chains: the driven chains of the character.
         source_tips: (D,) last joint of each of the performer's chains.
@@ -45,6 +80,8 @@ class _Link:
         retargets, exaggeration, limb_release: these remember the frames before.
     """
 
+    mapping: Mapping
+    view: Array
     rest: Rest
     chains: DrivenChains
     source_tips: NDArray[np.int64]
@@ -52,6 +89,26 @@ class _Link:
     retargets: ChainRetargets
     exaggeration: Exaggeration
     limb_release: LimbRelease
+
+    def reset(self) -> None:
+        self.retargets.reset()
+        self.exaggeration.reset()
+        self.limb_release.reset()
+
+    def snapshot(self) -> LinkState:
+        return LinkState(
+            self.mapping,
+            self.view,
+            self.rest,
+            self.retargets.snapshot(),
+            self.exaggeration.snapshot(),
+            self.limb_release.snapshot(),
+        )
+
+    def restore(self, state: LinkState) -> None:
+        self.retargets.restore(state.retargets)
+        self.exaggeration.restore(state.exaggeration)
+        self.limb_release.restore(state.limb_release)
 
 
 class PolylineDriver(MappedDriver):
@@ -87,6 +144,7 @@ class PolylineDriver(MappedDriver):
         self._surface = surface
         self._link: _Link | None = None
         self._positions = skeleton.tree.positions
+        self._weights = skeleton.rest_targets.weights
 
     def show(self, mapping: Mapping, view: Array) -> None:
         """Show a mapping without being driven by it: see `MappedDriver.show`."""
@@ -101,6 +159,7 @@ class PolylineDriver(MappedDriver):
         if rest is None:
             self._link = None
             self._positions = self._skeleton.tree.positions
+            self._weights = self._skeleton.rest_targets.weights
             return
         drives, nodes = self.mapping.drives, self._skeleton.tree.positions
         chains = self._driven_chains()
@@ -117,6 +176,8 @@ class PolylineDriver(MappedDriver):
         lengths = np.array([chain_length(nodes, drive.target) for drive in drives])
         height = float(np.ptp(self._character.vertices[:, 1]))
         self._link = _Link(
+            mapping=self.mapping,
+            view=self._view,
             rest=rest,
             chains=chains,
             source_tips=np.array([drive.source[-1] for drive in drives], dtype=np.int64),
@@ -173,9 +234,7 @@ class PolylineDriver(MappedDriver):
         """Forget the poses before: see `Driver.reset`."""
         link = self._link
         if link is not None:
-            link.retargets.reset()
-            link.exaggeration.reset()
-            link.limb_release.reset()
+            link.reset()
             self._weights = link.chains.weights(link.limb_release.weights)
 
     def pulls(self) -> NDArray[np.bool_]:
@@ -191,6 +250,35 @@ class PolylineDriver(MappedDriver):
             Highlight(self._positions[list(drive.target)], drive.source[1:])
             for drive in self.mapping.drives
         ]
+
+    def snapshot(self) -> PolylineState:
+        """Return what drives, and what is remembered: see `Driver.snapshot`."""
+        return PolylineState(
+            mapping=self.mapping,
+            view=self._view,
+            gains=self.gains.copy(),
+            positions=self._positions,
+            weights=self._weights,
+            link=None if self._link is None else self._link.snapshot(),
+        )
+
+    def restore(self, state: PolylineState) -> None:
+        """Go back to a snapshot; what drove then drives again."""
+        self._go_back_to(state.link)
+        self.show(state.mapping, state.view)
+        self.gains = state.gains.copy()
+        self._positions, self._weights = state.positions, state.weights
+
+    def _go_back_to(self, state: LinkState | None) -> None:
+        if state is None:
+            self._link = None
+            return
+        link = self._link
+        if link is None or link.mapping is not state.mapping or link.rest is not state.rest:
+            self.show(state.mapping, state.view)
+            self.prepare((), state.rest)
+        if self._link is not None:
+            self._link.restore(state)
 
 
 def _whole(strain: Strain, volume_gain: float) -> Array:

@@ -18,7 +18,7 @@ from runtime.driving.turn_limits import box_of, corners_of, limit_turns
 from runtime.puppet.puppet import Puppet
 from solvers.matching import SIZE_PREFERENCE, Match, TargetHierarchy
 from solvers.retarget.abstraction import SimplifiedSource
-from solvers.retarget.match_hysteresis import MatchHysteresis
+from solvers.retarget.match_hysteresis import MatchHysteresis, MatchHysteresisState
 from solvers.retarget.posture import likeness
 
 CANDIDATES = 20  # matches that can be cycled through
@@ -42,6 +42,19 @@ class Choices:
     extend: bool = True
     flip: bool = False
     patience: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PuppetMatchState:
+    """The state of a `PuppetMatch` between two frames; the driver's belongs to the puppet.
+
+    Attributes:
+        rest: the performer's rest state.
+        hysteresis: of the match shown.
+    """
+
+    rest: Rest | None
+    hysteresis: MatchHysteresisState
 
 
 class PuppetMatch:
@@ -80,6 +93,15 @@ class PuppetMatch:
         self._hysteresis = MatchHysteresis(choices.rank - 1)
         self._driver = self._make(make_driver)
         puppet.drive_with(self._driver)
+
+    def snapshot(self) -> PuppetMatchState:
+        """Return what is remembered between frames."""
+        return PuppetMatchState(self.rest, self._hysteresis.snapshot())
+
+    def restore(self, state: PuppetMatchState) -> None:
+        """Go back to a snapshot; the puppet's own brings the driver back."""
+        self.rest = state.rest
+        self._hysteresis.restore(state.hysteresis)
 
     @property
     def mapping(self) -> Mapping:

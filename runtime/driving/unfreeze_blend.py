@@ -1,10 +1,9 @@
-"""Characters that have held still ease to where their performer is by then; they do not jump.
+"""Blends characters that were frozen to the pose of their performer, so that they do not jump.
 
-It is the pose shown that is eased, after conditioning: the performer goes on to be seen, matched
-and published as they are, and no filter remembers places where nobody was. Each bone turns the
-short way in the body's own frame, and so does the heading of the whole, so that nothing collapses
-on its way: halfway between an arm that was up and one that is down lies an arm that is stretched
-out, not a point.
+The blend changes the pose that the puppets follow, after conditioning. Matching, publishing and
+filters see the performer's own pose. Each bone turns the short way in the body's own frame, and so
+does the heading of the whole, so that no limb collapses: halfway between an arm that was up and an
+arm that is down lies an arm that is stretched out, not a point.
 """
 
 from __future__ import annotations
@@ -24,14 +23,14 @@ from solvers.retarget.heading import turned
 Array = NDArray[np.float64]
 
 SECONDS = 0.3
-LONGEST_STEP = 0.1  # [s] that a frame may count for: who is lost on the way goes on from there
+LONGEST_STEP = 0.1  # [s] that a frame counts for at most: a performer lost meanwhile goes on there
 PARALLEL = 1e-9  # sine below which two bones have no axis between them
 FRONT, UP = np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Offset:
-    """How far the pose shown was from the performer's when characters were let go.
+    """How far the frozen pose was from the performer's when the characters were let go.
 
     Attributes:
         turns: (J, 3) [rad] rotation vectors that take each joint's bone to the one shown, in the
@@ -47,8 +46,31 @@ class _Offset:
     hips: Array
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class UnfreezeBlendState:
+    """The state of an `UnfreezeBlend` between two frames.
+
+    Attributes:
+        shown: the last pose that the puppets followed.
+        rests: of each puppet the performer's rest state.
+        offset: what is left of the way; None at its end.
+        frozen: whether the characters are frozen.
+        at: [s] of the last frame.
+        passed: [s] since the characters were let go.
+        stood: [s] for which they were frozen in all.
+    """
+
+    shown: Pose | None
+    rests: Sequence[Rest | None]
+    offset: _Offset | None
+    frozen: bool
+    at: float
+    passed: float
+    stood: float
+
+
 class UnfreezeBlend:
-    """Leads the pose that one performer's puppets follow on from where it was held.
+    """Blends from the pose in which characters were frozen to the pose of their performer.
 
     Args:
         skeleton: of every pose.
@@ -63,32 +85,50 @@ class UnfreezeBlend:
         self._shown: Pose | None = None
         self._rests: Sequence[Rest | None] = ()
         self._offset: _Offset | None = None
-        self._held = False
+        self._frozen = False
         self._at, self._passed, self._stood = -np.inf, 0.0, 0.0
 
-    def hold(self, time: float) -> None:
-        """Hold still at `time` [s]; the puppets follow nothing."""
+    def snapshot(self) -> UnfreezeBlendState:
+        """Return what is remembered between frames."""
+        return UnfreezeBlendState(
+            self._shown,
+            self._rests,
+            self._offset,
+            self._frozen,
+            self._at,
+            self._passed,
+            self._stood,
+        )
+
+    def restore(self, state: UnfreezeBlendState) -> None:
+        """Go back to a snapshot."""
+        self._shown, self._rests, self._offset = state.shown, state.rests, state.offset
+        self._frozen, self._at = state.frozen, state.at
+        self._passed, self._stood = state.passed, state.stood
+
+    def freeze(self, time: float) -> None:
+        """Stay frozen at `time` [s]; the puppets follow nothing."""
         if self._shown is not None:
-            self._held = True
+            self._frozen = True
             self._stood += max(time - self._at, 0.0)
             self._at = time
 
     def follow(self, pose: Pose, time: float, rests: Sequence[Rest | None]) -> Pose:
-        """What the puppets follow at `time` [s]: the pose itself, a moment after a hold.
+        """Return the pose that the puppets follow at `time` [s]; for a moment it is a blend.
 
-        Its time stands still while they are held, so that what swings takes up its swing.
+        Its time stands still while the characters are frozen, so that springs go on as they were.
 
         Args:
             pose: the performer's newest.
-            time: [s] of the newest frame of the show, whoever it is of.
-            rests: of each puppet its performer's rest state; when another is taken, characters
-                stand elsewhere at once, and the way there is not for this to lead.
+            time: [s] of the newest frame of the show, of any performer.
+            rests: of each puppet the performer's rest state. When one changes, the characters
+                stand elsewhere at once, and a blend that goes on ends.
         """
         if not _same(rests, self._rests):
-            self._rests, self._held, self._offset = rests, False, None
-        if self._held and self._shown is not None:
+            self._rests, self._frozen, self._offset = rests, False, None
+        if self._frozen and self._shown is not None:
             self._offset, self._passed = self._between(pose, self._shown), 0.0
-        self._held = False
+        self._frozen = False
         if self._offset is not None:
             self._passed += min(max(time - self._at, 0.0), LONGEST_STEP)
             pose = self._eased(pose, self._offset)

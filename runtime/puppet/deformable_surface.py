@@ -12,6 +12,7 @@ from runtime.characters.proxy import Proxy
 from runtime.driving.targets import HandleGroups, HandleTargets
 from solvers.deform.arap_cells import SPOKES
 from solvers.deform.handles import HARD
+from solvers.deform.solver_state import DeformationState
 from solvers.deform.stiff_segments import Articulation
 from solvers.squash_stretch import SquashStretchSolver
 from solvers.surface.edges import Edges
@@ -33,6 +34,21 @@ class Elasticity:
     cartoon: float = 0.0
     volume_gain: float = 1.0
     stiffness: float = 0.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SurfaceState:
+    """The state of a `DeformableSurface` between two frames.
+
+    Attributes:
+        solver: of the solver.
+        handles: the handles that are held.
+        weights: (H,) how firmly each is held.
+    """
+
+    solver: DeformationState
+    handles: HandleGroups
+    weights: Array
 
 
 class DeformableSurface:
@@ -102,6 +118,15 @@ class DeformableSurface:
         """Forget the last answer: the next one starts from the rest pose."""
         self._solver.reset()
 
+    def snapshot(self) -> SurfaceState:
+        """Return what the next answer depends on, besides targets and elasticity."""
+        return SurfaceState(self._solver.snapshot(), self._handles, self._weights)
+
+    def restore(self, state: SurfaceState) -> None:
+        """Go back to a snapshot of the same surface; the elasticity stays as it is."""
+        self._solver.restore(state.solver)
+        self._handles, self._weights, self._asked = state.handles, state.weights, None
+
     def deform(self, targets: HandleTargets, iterations: int) -> Array:
         """Return the deformed surface (C, 3) [m], from the last answer on.
 
@@ -118,7 +143,7 @@ class DeformableSurface:
         if handles is self._handles and targets.weights is self._asked:
             return
         weights = targets.weights[handles.group_of]
-        if handles is not self._handles:
+        if handles != self._handles:
             self._solver.hold(handles.vertices, groups=handles.group_of, weights=weights)
         elif not np.array_equal(weights, self._weights):
             self._solver.weigh(weights)

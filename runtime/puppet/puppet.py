@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +12,9 @@ from runtime.characters.character import Character
 from runtime.characters.proxy import proxy_of
 from runtime.driving.driver import Driver, Highlight
 from runtime.driving.performer import Pose
-from runtime.driving.targets import HandleTargets, PosedNodes
+from runtime.driving.targets import HandleTargets, PosedNodes, Targets
 from runtime.puppet.bound_skeleton import BoundSkeleton
-from runtime.puppet.deformable_surface import DeformableSurface
+from runtime.puppet.deformable_surface import DeformableSurface, SurfaceState
 from runtime.puppet.placement import Stance, put_on_stage
 from solvers.deform.arap_cells import SPOKES
 
@@ -33,6 +34,25 @@ class Motion:
 
     vertices: Array
     nodes: PosedNodes | None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PuppetState:
+    """The state of a `Puppet` between two frames.
+
+    Attributes:
+        surface: of the deformable surface.
+        targets: of the last frame.
+        stance: of the last frame.
+        driver_kind: the class of the driver; None without one.
+        driver: of the driver.
+    """
+
+    surface: SurfaceState
+    targets: Targets
+    stance: Stance
+    driver_kind: type[Driver] | None
+    driver: Any
 
 
 class Puppet:
@@ -102,6 +122,31 @@ class Puppet:
         """Go on as if no pose had been struck; the targets stay."""
         self.surface.reset()
         if self.driver is not None:
+            self.driver.reset()
+
+    def snapshot(self) -> PuppetState:
+        """Return what the next motion depends on, besides pose and elasticity."""
+        driver = self.driver
+        return PuppetState(
+            self.surface.snapshot(),
+            self._targets,
+            self._stance,
+            None if driver is None else type(driver),
+            None if driver is None else driver.snapshot(),
+        )
+
+    def restore(self, state: PuppetState) -> None:
+        """Go back to a snapshot of the same puppet.
+
+        A driver of another class than that of the snapshot stays and begins anew.
+        """
+        self.surface.restore(state.surface)
+        self._targets, self._stance = state.targets, state.stance
+        if self.driver is None:
+            return
+        if type(self.driver) is state.driver_kind:
+            self.driver.restore(state.driver)
+        else:
             self.driver.reset()
 
     @property

@@ -168,7 +168,7 @@ class FrameLoop:
                     if not self.frozen:
                         act.match_session.direct(parts[part])
             if self.frozen:
-                self._unfreeze_blends[part].hold(frame.time)
+                self._unfreeze_blends[part].freeze(frame.time)
                 continue
             with timer.stage("retarget"):
                 pose = self._eased(part, frame.time)

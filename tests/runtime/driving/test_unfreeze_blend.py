@@ -46,14 +46,14 @@ def bones_of(seen: np.ndarray) -> np.ndarray:
 
 
 def let_go(
-    held: Pose, target: Pose, times: Sequence[float], easing: UnfreezeBlend | None = None
+    held: Pose, target: Pose, times: Sequence[float], blend: UnfreezeBlend | None = None
 ) -> list[Pose]:
     """What is followed at `times` after a hold of two seconds that ends at 2.0 s."""
-    easing = easing or UnfreezeBlend(BODY)
-    easing.follow(held, 0.0, [None])
-    easing.hold(1.0)
-    easing.hold(2.0)
-    return [easing.follow(target, time, [None]) for time in times]
+    blend = blend or UnfreezeBlend(BODY)
+    blend.follow(held, 0.0, [None])
+    blend.freeze(1.0)
+    blend.freeze(2.0)
+    return [blend.follow(target, time, [None]) for time in times]
 
 
 def test_the_shortest_turn_takes_one_direction_to_the_other() -> None:
@@ -120,19 +120,19 @@ def test_a_body_turns_the_short_way(start: float, end: float) -> None:
 
 
 def test_a_second_hold_on_the_way_departs_from_there() -> None:
-    easing = UnfreezeBlend(BODY)
+    blend = UnfreezeBlend(BODY)
     held, target = followed(pose(UP, heading=0.5)), followed(pose(T_POSE, heading=2.5))
-    *_, halfway = let_go(held, target, [2.05, 2.1, 2.15], easing)
-    easing.hold(2.3)
-    again = easing.follow(followed(pose(heading=-2.0)), 2.3, [None])
+    *_, halfway = let_go(held, target, [2.05, 2.1, 2.15], blend)
+    blend.freeze(2.3)
+    again = blend.follow(followed(pose(heading=-2.0)), 2.3, [None])
     np.testing.assert_allclose(again.seen, halfway.seen, atol=1e-12)
     assert np.cos(again.heading - halfway.heading) == pytest.approx(1.0)
 
 
 def test_a_rest_state_that_is_taken_meanwhile_is_there_at_once() -> None:
-    easing, target = UnfreezeBlend(BODY), followed(pose(T_POSE))
-    let_go(followed(pose(UP)), target, [2.05], easing)
-    assert easing.follow(target, 2.1, [object()]).seen is target.seen
+    blend, target = UnfreezeBlend(BODY), followed(pose(T_POSE))
+    let_go(followed(pose(UP)), target, [2.05], blend)
+    assert blend.follow(target, 2.1, [object()]).seen is target.seen
 
 
 def test_who_is_lost_on_the_way_goes_on_from_there() -> None:
@@ -144,14 +144,14 @@ def test_who_is_lost_on_the_way_goes_on_from_there() -> None:
 
 
 def test_the_time_of_what_is_held_stands_still() -> None:
-    easing = UnfreezeBlend(BODY)
-    easing.hold(100.0)  # before anybody came: nothing to hold
+    blend = UnfreezeBlend(BODY)
+    blend.freeze(100.0)  # before anybody came: nothing to hold
     times = []
     for time in (100.0, 100.1, 100.2, 103.0, 103.1, 103.6):
         if time in (100.2, 103.0):
-            easing.hold(time)
+            blend.freeze(time)
         else:
-            followed_at = easing.follow(followed(pose(UP), time), time, [None])
+            followed_at = blend.follow(followed(pose(UP), time), time, [None])
             times.append(followed_at.time)
     np.testing.assert_allclose(times, [100.0, 100.1, 100.2, 100.7])
 
