@@ -209,6 +209,11 @@ class Player:
         return self._closed or (self._at_end and not self._loop)
 
     @property
+    def every_frame(self) -> bool:
+        """Whether each poll gives exactly the next frame, however long the loop takes."""
+        return math.isfinite(self._timing.frames_a_poll)
+
+    @property
     def position(self) -> float:
         """Recorded time [s] of the newest frame given, or where the last seek went."""
         return self._position

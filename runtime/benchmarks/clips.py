@@ -15,20 +15,12 @@ from typing import Any
 from devices.builtin.motions import MOTIONS
 from replay.builtin import builtin_recording
 from replay.formats import read_recording
-from replay.player import EveryFrame, Player
 from replay.recording import Recording
 from runtime.characters.builtin import BUILTIN
 from runtime.characters.character import Character
 from runtime.characters.open_character import load_character
-from runtime.conditioning.switches import for_recording
-from runtime.driving.match_session import MatchSession
-from runtime.driving.performer import Performer
-from runtime.driving.puppet_match import Choices
-from runtime.driving.rehearsal import rehearse
-from runtime.output.report.report import Report
-from runtime.puppet.puppet import Puppet
-from runtime.render.camera import front_camera
-from runtime.show.loop import FrameLoop
+from runtime.show.open_stream import play
+from runtime.show.show import Show
 
 FRAME_MS = 16.0  # the longest tick that is allowed
 
@@ -65,39 +57,20 @@ def run(
 
 
 def _perform(recording: Recording, character: Character) -> dict[str, Any]:
-    conditioning = for_recording()
-    performer = Performer(recording.skeleton, conditioning=conditioning)
-    puppet = Puppet(character)
-    camera = front_camera()
-    match_session = MatchSession(
-        performer, [puppet], lambda: camera.view_rotation, Choices(), [None]
-    )
-    rehearse(recording, "whole", match_session, conditioning)
-    report = Report(None)
-    player = Player(recording, EveryFrame())
-    part = report.cast(character)
-    loop = FrameLoop(
-        player,
-        performer,
-        [puppet],
-        match_session=match_session,
-        report=report,
-        scene=None,
-        outputs=[[part]],
-        conditioning=conditioning,
-    )
     over = 0
-    while not player.ended:
-        start = perf_counter()
-        loop.tick()
-        loop.settle()
-        over += 1e3 * (perf_counter() - start) > FRAME_MS
-    times, watchdog = report.times.summary()["frame"], part.summary()["watchdog"]
+    with Show(play(recording, every_frame=True), [character]) as show:
+        while not show.ended:
+            start = perf_counter()
+            show.tick()
+            show.settle()
+            over += 1e3 * (perf_counter() - start) > FRAME_MS
+        figures = show.report.summary()
+    watchdog = figures["watchdog"]
     return {
         "vertices": len(character.vertices),
-        **times,
+        **figures["stages_ms"]["frame"],
         "over": over,
-        "stretch_p99": part.summary()["stretch"]["p99"],
+        "stretch_p99": figures["stretch"]["p99"],
         "inverted_last": watchdog["inverted"]["last"],
         "inverted_longest": watchdog["inverted"]["longest"],
     }

@@ -21,12 +21,8 @@ from replay.recording import Recording
 from runtime.characters.builtin import builtin_character
 from runtime.characters.character import Character
 from runtime.characters.proxy import DENSE, PROXY, Proxy, proxy_of
-from runtime.driving.match_session import MatchSession
-from runtime.driving.performer import Performer
-from runtime.driving.puppet_match import Choices
-from runtime.driving.rehearsal import rehearse
-from runtime.puppet.puppet import Puppet
-from runtime.render.camera import front_camera
+from runtime.show.open_stream import play
+from runtime.show.show import Show
 from solvers.arap import ArapSolver
 from solvers.surface.decimation import decimate
 from solvers.surface.edges import Edges
@@ -156,18 +152,26 @@ def _perform(character: Character, proxy: Proxy, recording: Recording, frames: i
     """Perform with a puppet of the proxy and return its handles."""
     weights = None if character.weights is None else character.weights[proxy.kept]
     coarse = replace(character, vertices=proxy.vertices, faces=proxy.faces, weights=weights)
-    puppet = Puppet(coarse)
-    performer, camera = Performer(recording.skeleton), front_camera()
-    match_session = MatchSession(
-        performer, [puppet], lambda: camera.view_rotation, Choices(), [None]
-    )
-    rehearse(recording, "whole", match_session)
-    binding = puppet.bound_skeleton.binding
-    targets = []
-    for index in range(0, len(recording), STEP)[:frames]:
-        puppet.follow(performer.follow(recording.frame(index)))
-        targets.append(puppet.deform().vertices[binding.handles].copy())
+    targets: list[Floats] = []
+    with Show(play(_thinned(recording), every_frame=True), [coarse]) as show:
+        binding = show.puppets[0].bound_skeleton.binding
+        while len(targets) < frames and show.tick():
+            targets.append(show.vertices[0][binding.handles])
     return _Handles(binding.handles, binding.anchor, targets)
+
+
+def _thinned(recording: Recording) -> Recording:
+    """Every `STEP`-th frame of a recording."""
+    rotations = recording.rotations
+    return replace(
+        recording,
+        times=recording.times[::STEP],
+        positions=recording.positions[::STEP],
+        rotations=None if rotations is None else rotations[::STEP],
+        confidence=recording.confidence[::STEP],
+        performers=recording.performers[::STEP],
+        arrivals=recording.arrivals[::STEP],
+    )
 
 
 class Comparison:

@@ -21,7 +21,7 @@ from replay.mcap.reader import McapReader
 from replay.recorded_stream import RecordedStream
 from replay.recorder import Recorder
 from runtime.show.clock import Ticker
-from runtime.show.warn import warn
+from runtime.show.messages import warn
 
 MOMENTS = 50
 PERFORMERS = 4

@@ -8,6 +8,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, Self
 from urllib.parse import urlsplit
 
@@ -22,23 +23,20 @@ from devices.skeleton import Skeleton, SkeletonFrame
 from devices.transport.live_stream import LiveStream
 from devices.transport.udp import UdpTransport
 from runtime.characters.builtin import builtin_character
-from runtime.conditioning.switches import for_live
-from runtime.driving.match_session import MatchSession
-from runtime.driving.performer import Performer, Pose
-from runtime.driving.puppet_match import Choices
-from runtime.output.report.report import Report
-from runtime.puppet.puppet import Motion, Puppet
+from runtime.driving.performer import Pose
+from runtime.puppet.puppet import Motion
 from runtime.render.context import headless_context, is_software, release_headless
 from runtime.show.collector_pauses import objects_frozen
-from runtime.show.interrupt import held
-from runtime.show.loop import FrameLoop
-from runtime.show.pacing import OnArrival, SpareTime
+from runtime.show.pacing import OnArrival
 from runtime.show.scene import Scene
+from runtime.show.settings import MatchSettings, ShowSettings
+from runtime.show.show import Show
 
 RATES = (30.0, 60.0, 120.0)
 WAYS = ("zmq", "vmc")
 CHARACTER = "mannequin"
 SIZE = (320, 180)
+SETTINGS = ShowSettings(size=SIZE, match=MatchSettings(patience=0.0))
 WARM_UP = 1.0  # [s] before the measurement
 MEASURED = 8.0  # [s] of measurement
 BUDGET_MS = {"p50": 4.0, "p99": 10.0}
@@ -119,12 +117,12 @@ def measured(
             stream = closing.enter_context(LiveStream(udp, VmcDecoder))
             sender = closing.enter_context(_sender(way, rate, count, str(udp.port)))
             _line(sender)  # it is ready
-        show = _Show(context, _Noted(stream), drawn=drawn)
-        closing.callback(show.scene.close)
+        measurement = _Measurement(context, _Noted(stream), drawn=drawn)
+        closing.enter_context(measurement.show)
         closing.enter_context(objects_frozen())
         _say(sender, "go")
-        show.perform(count)
-    return show.times(count, skipped=round(rate * WARM_UP))
+        measurement.perform(count)
+    return measurement.times(count, skipped=round(rate * WARM_UP))
 
 
 class _Noted:
@@ -159,60 +157,56 @@ class _Noted:
         self.close()
 
 
-class _Stamping(Scene):
-    """A scene that notes when [s] the vertices were on the GPU and when the picture was drawn."""
+class _StampingScene(Scene):
+    """A scene that notes when [s] the vertices were on the GPU and when the picture was drawn.
 
-    context: Context
-    draws = True
-    uploaded = drawn = float("nan")
+    Args:
+        draws: whether pictures are drawn.
+    """
+
+    def __init__(self, context: Context, *arguments: Any, draws: bool, **options: Any) -> None:
+        self._context = context
+        self._draws = draws
+        self.uploaded = self.drawn = float("nan")
+        super().__init__(context, *arguments, **options)
 
     def upload(self, motions: Sequence[Motion]) -> None:
         super().upload(motions)
-        self.context.finish()
+        self._context.finish()
         self.uploaded = time.perf_counter()
 
     def draw(self, pose: Pose | None) -> None:
-        if self.draws:
+        if self._draws:
             super().draw(pose)
-            self.context.finish()
+            self._context.finish()
             self.drawn = time.perf_counter()
 
 
-class _Show:
-    """A live show of one character, as `bunraku live` runs it."""
+class _Measurement:
+    """A live show of one character, as `bunraku live` runs it, and the times of its frames."""
 
     def __init__(self, context: Context, stream: _Noted, *, drawn: bool) -> None:
         self._stream = stream
         self._rows: list[tuple[float, ...]] = []
-        performer = Performer(stream.skeleton, "whole", for_live())
-        puppet = Puppet(builtin_character(CHARACTER))
-        self.scene = _Stamping(context, SIZE, [puppet], stream.skeleton)
-        self.scene.context, self.scene.draws = context, drawn
-        view = self.scene.camera.view_rotation
-        report = Report(None)
-        self._loop = FrameLoop(
+        self._pace = OnArrival(stream.stream)
+        self.show = Show(
             stream,
-            performer,
-            [puppet],
-            match_session=MatchSession(performer, [puppet], lambda: view, Choices(), [None]),
-            report=report,
-            scene=self.scene,
-            outputs=[[report.cast(puppet.character)]],
-            conditioning=for_live(),
-            shown=True,
+            [builtin_character(CHARACTER)],
+            SETTINGS,
+            pace=self._pace,
+            context=context,
+            make_scene=partial(_StampingScene, draws=drawn),
         )
 
     def perform(self, count: int) -> None:
         """Perform until `count` frames have come, or none has come for `PATIENCE`."""
-        stream, scene = self._stream, self.scene
-        pace = OnArrival(stream.stream)
-        spare = SpareTime(pace, self._loop)
+        stream, scene = self._stream, self.show.controls.scene
+        assert isinstance(scene, _StampingScene)
         heard = time.perf_counter()
         while stream.given < count and time.perf_counter() - heard < PATIENCE:
-            pace.wait()
-            with held():
-                performed = self._loop.tick()
-            spare.spend()
+            self._pace.wait()
+            performed = self.show.tick()
+            self.show.settle()
             if performed and stream.newest is not None:
                 heard = time.perf_counter()
                 newest = stream.newest

@@ -21,18 +21,12 @@ from replay.recorder import WAITING, Recorder
 from runtime.benchmarks.memory import resident_memory
 from runtime.benchmarks.stolen_time import JIFFY, stolen_time
 from runtime.characters.builtin import builtin_character
-from runtime.conditioning.switches import for_live
-from runtime.driving.match_session import MatchSession
-from runtime.driving.performer import Performer
-from runtime.driving.puppet_match import Choices
-from runtime.output.report.report import Report
-from runtime.puppet.puppet import Puppet
-from runtime.render.camera import front_camera
 from runtime.show.clock import Ticker
 from runtime.show.collector_pauses import objects_frozen
-from runtime.show.loop import FrameLoop
-from runtime.show.pacing import Pace, SpareTime
-from runtime.show.warn import warn
+from runtime.show.messages import warn
+from runtime.show.pacing import Pace
+from runtime.show.settings import MatchSettings, ShowSettings
+from runtime.show.show import Show
 
 HOUR = 3600.0  # [s]
 PERFORMERS = 4
@@ -42,6 +36,7 @@ MOST_WARM_UP = 300.0  # [s]
 TICKS_A_SAMPLE = 60  # ticks from one look at the memory to the next
 MOST_GROWTH = 0.01
 LONGEST_TICK = 0.05  # [s]
+SETTINGS = ShowSettings(match=MatchSettings(patience=0.0))
 WAITING_ACCELERATED = 256  # frames queued for the disk when the show waits for the disk
 
 
@@ -190,15 +185,15 @@ def soaked(path: Path, seconds: float, tempo: Tempo) -> Soak:
         frames = most + int(BACKLOG_SECONDS * RATE)  # the last poll may be late
         keep = recorder.write if tempo.waits_for_disk else recorder.offer
         log = _Log(keep, frames * PERFORMERS)
-        loop = _loop(RecordedStream(stream, log.note))
-        spare = SpareTime(tempo.pace, loop)
+        recorded = RecordedStream(stream, log.note)
+        show = Show(recorded, [builtin_character(CHARACTER)], SETTINGS, pace=tempo.pace)
         tick, end = 0, tempo.clock() + seconds
-        with objects_frozen():
+        with show, objects_frozen():
             before = stolen_time()
             while tempo.clock() < end and tick < most:
                 began, worked = time.perf_counter(), time.thread_time()
-                loop.tick()
-                spare.spend()
+                show.tick()
+                show.settle()
                 spent[tick] = time.perf_counter() - began
                 work[tick] = time.thread_time() - worked
                 now = stolen_time()
@@ -210,26 +205,6 @@ def soaked(path: Path, seconds: float, tempo: Tempo) -> Soak:
     samples = (tick - 1) // TICKS_A_SAMPLE + 1
     found = log.found_in(path)
     return Soak(log.count, found, spent[:tick], work[:tick], stolen[:tick], memory[:samples])
-
-
-def _loop(stream: RecordedStream) -> FrameLoop:
-    """Return a show of one character, driven by the first performer, without pictures."""
-    performer = Performer(stream.skeleton)
-    puppet = Puppet(builtin_character(CHARACTER))
-    camera = front_camera()
-    report = Report(None)
-    return FrameLoop(
-        stream,
-        performer,
-        [puppet],
-        match_session=MatchSession(
-            performer, [puppet], lambda: camera.view_rotation, Choices(), [None]
-        ),
-        report=report,
-        scene=None,
-        outputs=[[report.cast(puppet.character)]],
-        conditioning=for_live(),
-    )
 
 
 class _Log:

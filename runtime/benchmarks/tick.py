@@ -3,15 +3,10 @@
 from __future__ import annotations
 
 from replay.builtin import builtin_recording
-from replay.player import EveryFrame, Player
 from runtime.characters.builtin import BUILTIN, builtin_character
-from runtime.driving.match_session import MatchSession
-from runtime.driving.performer import Performer
-from runtime.driving.puppet_match import Choices
-from runtime.output.report.report import Report
-from runtime.puppet.puppet import Puppet
-from runtime.render.camera import front_camera
-from runtime.show.loop import FrameLoop
+from runtime.show.open_stream import play
+from runtime.show.settings import CharacterSettings, ShowSettings
+from runtime.show.show import Show
 
 BUDGET_MS = {"p50": 4.0, "p99": 8.0}
 ITERATIONS = (1, 2, 3)
@@ -43,27 +38,12 @@ def run() -> dict[str, object]:
 
 
 def _replay(name: str, iterations: int) -> dict[str, dict[str, float]]:
-    recording = builtin_recording()
-    performer = Performer(recording.skeleton)
-    puppet = Puppet(builtin_character(name), iterations=iterations)
-    camera = front_camera()
-    match_session = MatchSession(
-        performer, [puppet], lambda: camera.view_rotation, Choices(), [None]
-    )
-    report = Report(None)
+    """Replay twice, and return the times of the second pass."""
+    settings = ShowSettings(characters=(CharacterSettings(iterations=iterations),))
+    times: dict[str, dict[str, float]] = {}
     for _ in range(2):
-        report = Report(None)
-        player = Player(recording, EveryFrame())
-        loop = FrameLoop(
-            player,
-            performer,
-            [puppet],
-            match_session=match_session,
-            report=report,
-            scene=None,
-            outputs=[[report.cast(puppet.character)]],
-        )
-        while not player.ended:
-            loop.tick()
-            loop.settle()
-    return report.times.summary()
+        stream = play(builtin_recording(), every_frame=True)
+        with Show(stream, [builtin_character(name)], settings) as show:
+            show.run()
+            times = show.report.times.summary()
+    return times

@@ -1,82 +1,95 @@
-"""`bunraku bridge`: the performer before this machine's device drives shows on others."""
+"""`bunraku bridge`: sends the performer at this machine's device to shows on other machines."""
 
 from __future__ import annotations
 
 import argparse
 import math
-import sys
 import time
-from contextlib import suppress
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from tqdm import tqdm
-
-from devices.bridge.keys import PUBLISHER, SUBSCRIBER, make_keys
 from devices.errors import InputError
-from devices.skeleton import Skeleton
-from devices.stream import SkeletonStream, open_stream
-from replay.recorded_stream import RecordedStream
-from runtime.output.live.bridge_publisher import BoundEndpoint, BridgePublisher, binding
-from runtime.show.clock import Ticker
-from runtime.show.interrupt import held
+from runtime.cli.arguments import positive
+from runtime.show.interrupts import interrupts_deferred
 
-POLLS = 240.0  # a second: twice the fastest sensor; what has a thread of its own does not wait
+if TYPE_CHECKING:
+    from devices.stream import SkeletonStream
+    from runtime.output.live.bridge_publisher import BridgePublisher
+
+HELP = "a live stream goes to shows on other machines"
+POLLS = 240.0  # a second: twice the rate of the fastest sensor
 
 
-def bridge(options: argparse.Namespace) -> int:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments and options."""
+    parser.add_argument("--device", metavar="URL", help="the device; `bunraku devices` lists them")
+    parser.add_argument(
+        "--bind",
+        default="tcp://127.0.0.1:5570",
+        metavar="tcp://HOST:PORT",
+        help="address of the bridge, which shows open as zmq+tcp://HOST:PORT (default "
+        "tcp://127.0.0.1:5570)",
+    )
+    parser.add_argument(
+        "--keys",
+        type=Path,
+        metavar="DIR",
+        help="keys of this machine, needed for shows on other machines",
+    )
+    parser.add_argument(
+        "--make-keys", type=Path, metavar="DIR", help="write keys for both machines and exit"
+    )
+    parser.add_argument("--seconds", type=positive, metavar="N", help="stop after N s")
+
+
+def run(options: argparse.Namespace) -> int:
     """Send every frame that comes until Ctrl-C or `--seconds`; or make keys and end.
 
     Raises:
-        InputError: the device cannot be opened, or the address not be bound or not be guarded.
+        InputError: the device cannot be opened, the address cannot be bound, or it has no keys.
     """
+    from devices.bridge.keys import PUBLISHER
+    from devices.stream import open_stream
+    from runtime.output.live.bridge_publisher import binding
+    from runtime.show.messages import say
+    from runtime.show.outputs import open_publisher
+
     if options.make_keys is not None:
         return _make_keys(options.make_keys)
     if options.device is None:
         raise InputError("a bridge needs --device URL, as `bunraku devices` lists them")
     with open_stream(options.device) as stream:
-        where = binding(options.bind, options.keys, option=f"--keys DIR/{PUBLISHER}")
-        publisher = open_publisher(where, stream.skeleton)
+        endpoint = binding(options.bind, options.keys, option=f"--keys DIR/{PUBLISHER}")
+        publisher = open_publisher(endpoint, stream.skeleton)
         try:
             _carry(stream, publisher, options.seconds or math.inf)
         finally:
-            with held():
+            with interrupts_deferred():
                 publisher.close()
             audience, lost = publisher.audience, publisher.lost
-            said = f"{audience.frames} frames came, {audience.sent} went to stages"
-            say(said + (f", {lost} lost" if lost else ""))
+            line = f"{audience.frames} frames came, {audience.sent} went to stages"
+            say(line + (f", {lost} lost" if lost else ""))
     return 0
 
 
-def open_publisher(where: BoundEndpoint, skeleton: Skeleton) -> BridgePublisher:
-    """A publisher that tells the operator where it is, and who comes and goes.
-
-    Raises:
-        InputError: the address cannot be bound.
-    """
-    publisher = BridgePublisher(where, skeleton, tell=say)
-    say(f"sending to whoever opens zmq+{publisher.endpoint}")
-    return publisher
-
-
-def say(line: str) -> None:
-    """One line to the operator, from any thread, without tearing a progress bar."""
-    with suppress(OSError, ValueError):
-        tqdm.write(f"bunraku: {line}", file=sys.stderr)
-        sys.stderr.flush()
-
-
 def _carry(stream: SkeletonStream, publisher: BridgePublisher, seconds: float) -> None:
+    """Give the publisher every frame for `seconds` [s]."""
+    from replay.recorded_stream import RecordedStream
+    from runtime.show.clock import Ticker
+
     ticker = Ticker(POLLS)
     over = time.perf_counter() + seconds
     carried = RecordedStream(stream, publisher.write)
     while not stream.ended and time.perf_counter() < over:
-        with held():
+        with interrupts_deferred():
             carried.poll()
         ticker.wait()
     carried.keep = None
 
 
 def _make_keys(folder: Path) -> int:
+    from devices.bridge.keys import PUBLISHER, SUBSCRIBER, make_keys
+
     make_keys(folder)
     print(
         f"{folder / PUBLISHER}: for the machine of the device: "

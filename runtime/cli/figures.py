@@ -1,100 +1,35 @@
-"""`bunraku figures`: the paper's figures on squash and stretch, drawn from what our solvers do."""
+"""`bunraku figures`: draws the paper's figures on squash and stretch with our own solvers."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
-from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-from PIL import Image
+from runtime.cli.arguments import size
+from runtime.cli.show_options import add_character_option
 
-from runtime.characters.character import Character
-from runtime.characters.open_character import load_character
-from runtime.figures import convergence
-from runtime.figures.bird import BIRD, bird, tail_volume
-from runtime.figures.gallery import Exhibit, Gallery
-from runtime.figures.plain import PlainSolver, volume
-from runtime.figures.poses import Press, perform
-from runtime.output.files.whole_file import check_writable, whole_file
-from solvers.arap import ArapSolver
-from solvers.linear.laplacian import Floats
-from solvers.squash_stretch import SquashStretchSolver
-
-POSES = {"squashed": (0.65, 0.0), "stretched": (1.35, 0.0), "leaning": (0.8, 0.7)}
-_BALLOON_STEPS = 40
+HELP = "draw the figures on squash and stretch"
 
 
-def figures(options: argparse.Namespace) -> int:
-    """Write figure-5.png, figure-6.png and figure-7.png; say in numbers what they show."""
-    folder: Path = options.folder
-    paths = [folder / f"figure-{number}.png" for number in (5, 6, 7)]
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments and options."""
+    parser.add_argument("folder", type=Path, metavar="DIR", help="folder for the pictures")
+    parser.add_argument(
+        "--size",
+        type=size,
+        default=(1500, 420),
+        metavar="WxH",
+        help="width and height of a row in pixels (default 1500x420)",
+    )
+    add_character_option(parser, required=False)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Write figure-5.png, figure-6.png and figure-7.png; print their figures in numbers."""
+    from runtime.characters.open_character import load_character
+    from runtime.figures.paper_figures import draw_figures
+
     characters = [load_character(name) for name in options.character or ["cactus"]]
-    folder.mkdir(parents=True, exist_ok=True)
-    for path in paths:
-        check_writable(path)
-    with Gallery(options.size) as gallery:
-        _write(paths[0], np.concatenate([_rigid_and_cartoon(gallery, c) for c in characters]))
-        _write(paths[1], np.concatenate([_balloon(gallery, c) for c in [bird(), *characters]]))
-    curves = convergence.measure()
-    width = options.size[0]
-    _write(paths[2], np.asarray(convergence.draw(curves, (width, 3 * width // 5))))
-    print("\n".join(convergence.table(curves)))
-    print("\n".join(str(path) for path in paths))
+    for line in draw_figures(options.folder, characters, options.size):
+        print(line)
     return 0
-
-
-def _rigid_and_cartoon(gallery: Gallery, character: Character) -> NDArray[np.uint8]:
-    """Figure 5: a character as it is, then rigid and as a cartoon, for each of the poses."""
-    press = Press.on(character)
-    exhibits = [Exhibit(character, character.vertices, press.handles, "at rest")]
-    for pose, (ratio, lean) in POSES.items():
-        for name, solver in _solvers(character, press).items():
-            answer = perform(solver, press, ratio, lean)
-            exhibits.append(Exhibit(character, answer, press.handles, f"{pose}, {name}"))
-            print(f"figure 5  {character.name}, {pose}, {name}: {_kept(answer, character)}")
-    return gallery.row(exhibits)
-
-
-def _solvers(character: Character, press: Press) -> dict[str, ArapSolver]:
-    given: Any = (character.vertices, character.faces, press.handles)
-    return {
-        "rigid": ArapSolver(*given, groups=press.groups),
-        "ours": SquashStretchSolver(*given, groups=press.groups),
-    }
-
-
-def _balloon(gallery: Gallery, character: Character) -> NDArray[np.uint8]:
-    """Figure 6: squashed under one constraint on the whole volume, and with ours, kept locally."""
-    press = Press.on(character)
-    ratio, lean = POSES["squashed"]
-    ours = perform(_solvers(character, press)["ours"], press, ratio, lean)
-    plain = PlainSolver(character.vertices, character.faces, press.handles)
-    whole = character.vertices
-    for share in np.clip(np.linspace(0.0, 2.0, _BALLOON_STEPS), 0.0, 1.0):
-        whole = whole.copy()
-        whole[press.handles] = press.targets(1.0 + share * (ratio - 1.0), lean)
-        whole = plain.whole_volume_step(whole)
-    exhibits = [Exhibit(character, character.vertices, press.handles, "at rest")]
-    for name, answer in {"whole volume kept": whole, "ours, kept locally": ours}.items():
-        kept = _kept(answer, character)
-        if character.name == BIRD:
-            tail = tail_volume(answer, character) / tail_volume(character.vertices, character)
-            kept += f", of its tail {tail:.1%}"
-        print(f"figure 6  {character.name}, {name}: {kept}")
-        exhibits.append(Exhibit(character, answer, press.handles, name))
-    return gallery.row(exhibits)
-
-
-def _kept(answer: Floats, character: Character) -> str:
-    """In words, the volume at an answer (N, 3) as a share of that at rest."""
-    rest = volume(character.vertices, character.faces)
-    if abs(rest) < 1e-9:
-        return "no volume to keep"
-    return f"volume {volume(answer, character.faces) / rest:.1%}"
-
-
-def _write(path: Path, pixels: NDArray[np.uint8]) -> None:
-    with whole_file(path) as partial:
-        Image.fromarray(pixels[..., :3]).save(partial, format="PNG", optimize=True)

@@ -1,17 +1,26 @@
-"""`bunraku info`: what is in a recording or a character's file."""
+"""`bunraku info`: prints what a recording or a character's file contains."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
 
-from replay.formats import recognise
-from replay.info import summary
-from runtime.characters.open_character import is_character, load_character
+HELP = "what is in a recording or a character's file"
 
 
-def info(options: argparse.Namespace) -> int:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments and options."""
+    parser.add_argument(
+        "file", metavar="FILE", help="a recording, a mesh, a rig, or the name of a built-in one"
+    )
+
+
+def run(options: argparse.Namespace) -> int:
     """Print what is in a recording, a mesh or a rig."""
+    from replay.formats import recognise
+    from replay.info import summary
+    from runtime.characters.open_character import is_character
+
     if is_character(options.file):
         lines = _of_character(options.file)
     else:
@@ -23,6 +32,8 @@ def info(options: argparse.Namespace) -> int:
 
 
 def _of_character(name: str) -> list[str]:
+    from runtime.characters.open_character import load_character
+
     character = load_character(name)
     width, height, depth = character.vertices.max(axis=0) - character.vertices.min(axis=0)
     parents = character.skeleton.parents

@@ -1,53 +1,65 @@
-"""`bunraku record`: a live stream goes to a file, without a character."""
+"""`bunraku record`: writes a live performer's frames to a file, without a character."""
 
 from __future__ import annotations
 
 import argparse
 import math
-import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
 
-from devices.errors import InputError
-from devices.skeleton import SkeletonFrame
-from devices.stream import SkeletonStream, open_stream
-from replay.recorded_stream import RecordedStream
-from replay.recorder import Recorder
-from runtime.output.files.whole_file import check_writable
-from runtime.show.clock import Ticker
-from runtime.show.interrupt import held
-from runtime.show.provenance import provenance
-from runtime.show.takes import set_aside
-from runtime.show.warn import warn
+from runtime.cli.arguments import positive
+from runtime.show.interrupts import interrupts_deferred
 
-POLLS = 240.0  # a second: twice the fastest sensor
+if TYPE_CHECKING:
+    from devices.skeleton import SkeletonFrame
+    from devices.stream import SkeletonStream
+    from replay.recorder import Recorder
+
+HELP = "a live stream goes to a file, without a character"
+POLLS = 240.0  # a second: twice the rate of the fastest sensor
 
 
-def record(options: argparse.Namespace) -> int:
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments and options."""
+    parser.add_argument(
+        "--device", required=True, metavar="URL", help="the device; `bunraku devices` lists them"
+    )
+    parser.add_argument("out", type=Path, metavar="OUT.mcap", help="the file to write")
+    parser.add_argument("--seconds", type=positive, metavar="N", help="stop after N s")
+
+
+def run(options: argparse.Namespace) -> int:
     """Write every frame that comes until Ctrl-C or `--seconds`.
 
     Raises:
         InputError: the device cannot be opened, or the disk fails; the frames until then are kept.
     """
+    from devices.errors import InputError
+    from devices.stream import open_stream
+    from replay.recorded_stream import RecordedStream
+    from replay.recorder import Recorder
+    from runtime.output.files.whole_file import check_writable
+    from runtime.show.messages import say, warn
+    from runtime.show.provenance import provenance
+    from runtime.show.takes import set_aside
+
     check_writable(options.out)
     warnings: list[str] = []
     with open_stream(options.device) as stream:
         set_aside(options.out, warn)
-        recorder = Recorder(
-            options.out,
-            stream.skeleton,
-            source=provenance(options.device),
-            tell=warnings.append,
-        )
+        source = provenance(options.device)
+        recorder = Recorder(options.out, stream.skeleton, source=source, tell=warnings.append)
         seconds = options.seconds or math.inf
         recorded = RecordedStream(stream, _first_seconds(recorder.offer, seconds))
         try:
-            _watch(recorded, recorder, warnings, seconds)
+            _poll(recorded, recorder, warnings, seconds)
         finally:
-            with held():
+            with interrupts_deferred():
                 recorder.close()
             lost = f", {recorder.lost} lost" if recorder.lost else ""
-            print(f"bunraku: {recorder.frames} frames in {options.out}{lost}", file=sys.stderr)
+            say(f"{recorder.frames} frames in {options.out}{lost}")
     if recorder.fault:
         raise InputError(recorder.fault)
     return 0
@@ -56,7 +68,7 @@ def record(options: argparse.Namespace) -> int:
 def _first_seconds(
     keep: Callable[[SkeletonFrame], None], seconds: float
 ) -> Callable[[SkeletonFrame], None]:
-    """`keep` for frames of less than `seconds` [s] after the first, nothing for those after."""
+    """`keep`, limited to frames of less than `seconds` [s] after the first."""
     began: float | None = None
 
     def take(frame: SkeletonFrame) -> None:
@@ -68,14 +80,17 @@ def _first_seconds(
     return take
 
 
-def _watch(stream: SkeletonStream, recorder: Recorder, warnings: list[str], seconds: float) -> None:
-    """Let frames come for so long [s], or until the recorder fails, and say what it has to say."""
+def _poll(stream: SkeletonStream, recorder: Recorder, warnings: list[str], seconds: float) -> None:
+    """Poll for `seconds` [s], or until the recorder fails, and print its warnings."""
+    from runtime.show.clock import Ticker
+    from runtime.show.messages import warn
+
     ticker = Ticker(POLLS)
     began = time.perf_counter()
     over = False
     while not (stream.ended or over or recorder.fault):
         over = time.perf_counter() - began >= seconds
-        with held():
+        with interrupts_deferred():
             stream.poll()
         while warnings and not recorder.fault:
             warn(warnings.pop(0))

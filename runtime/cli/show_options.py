@@ -1,10 +1,12 @@
-"""The options of a show: of `bunraku demo`, `replay` and `live`."""
+"""The options of a show (`bunraku demo`, `replay`, `live`), and the settings they stand for."""
 
 from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import Any
 
+from devices.errors import InputError
 from runtime.cli.arguments import (
     colour,
     counting,
@@ -17,19 +19,42 @@ from runtime.cli.arguments import (
     size,
     stiffness,
 )
+from runtime.conditioning.switches import SWITCHES
+from runtime.render.background import NOTHING, Background
+from runtime.show.settings import (
+    ENERGIES,
+    CharacterSettings,
+    FileSettings,
+    MatchSettings,
+    RemoteSettings,
+    SenderSettings,
+    ShowSettings,
+)
 
 CONDITIONING = {
-    "order": "drop duplicates and late frames, go on where a clock jumps",
-    "identities": "know performers again under a new number",
-    "swaps": "put limbs right whose left and right are exchanged",
-    "outliers": "leave out joints that jump and bones that stretch",
-    "filter": "smooth (One-Euro); not on recordings by default",
+    "order": "drop duplicate and late frames; continue where a clock jumps",
+    "identities": "recognise a performer who returns under a new number",
+    "swaps": "correct limbs whose left and right are exchanged",
+    "outliers": "ignore joints that jump and bones that stretch",
+    "filter": "smooth (One-Euro); off by default for recordings",
     "predict": "show where joints will be one frame later; off by default",
-    "level": "keep the floor level; not on recordings by default",
-    "mirror": "as in a mirror, left is right; off by default",
-    "scale": "make all performers the same size; not on recordings by default",
-    "recalibrate": "a T or A pose held for a second is the rest state; off by default",
+    "level": "keep the floor level; off by default for recordings",
+    "mirror": "exchange left and right, as in a mirror; off by default",
+    "scale": "make all performers the same size; off by default for recordings",
+    "recalibrate": "take a T or A pose that is kept still for a second as the rest state; off by "
+    "default",
 }
+
+
+def add_character_option(parser: argparse.ArgumentParser, *, required: bool) -> None:
+    """Add the option that names the characters."""
+    parser.add_argument(
+        "--character",
+        action="append",
+        required=required,
+        metavar="C",
+        help="a mesh (obj, ply, stl, off, glb, gltf, vrm) or a built-in character; may be repeated",
+    )
 
 
 def add_show_options(parser: argparse.ArgumentParser) -> None:
@@ -38,98 +63,218 @@ def add_show_options(parser: argparse.ArgumentParser) -> None:
     _add_remote(parser)
     _add_conditioning(parser)
     _add_match(parser)
-    _add_matter(parser)
+    _add_deformation(parser)
     _add_files(parser)
     _add_other_programs(parser)
 
 
+def show_settings(options: argparse.Namespace, origin: str) -> ShowSettings:
+    """The settings that the options of a command line ask for.
+
+    Args:
+        options: with those of `add_show_options`, and `character`, a list of names.
+        origin: the address or name of the stream.
+
+    Raises:
+        InputError: options contradict each other.
+    """
+    count = len(options.character)
+    if options.performers > count:
+        raise InputError(
+            f"--performers {options.performers} needs as many characters, got {count}; give "
+            "--character more often"
+        )
+    return ShowSettings(
+        size=options.size,
+        window=not options.headless,
+        background=_background(options),
+        plain=options.plain,
+        fps=options.fps,
+        match=MatchSettings(
+            source=options.source,
+            performers=options.performers,
+            rank=options.match,
+            mapping=options.mapping,
+            extend=options.chains == "extend",
+            flip=options.flip,
+        ),
+        characters=tuple(_character(options, number) for number in range(count)),
+        conditioning={
+            name: getattr(options, name) for name in SWITCHES if getattr(options, name) is not None
+        },
+        files=FileSettings(
+            video=options.video,
+            frames=options.frames,
+            cache=options.cache,
+            report=options.report,
+            record=options.record,
+            export=options.export,
+        ),
+        senders=SenderSettings(
+            virtual_camera=options.virtual_camera,
+            ndi=options.ndi,
+            spout=options.spout,
+            vmc=options.vmc,
+            publish=options.publish,
+            publish_keys=options.publish_keys,
+        ),
+        remote=_remote(options),
+        origin=origin,
+    )
+
+
+def _background(options: argparse.Namespace) -> Background | None:
+    if options.transparent:
+        return NOTHING
+    return None if options.background is None else Background(*options.background)
+
+
+def _character(options: argparse.Namespace, number: int) -> CharacterSettings:
+    """The settings of one character; the last value of an option is also for all that follow."""
+    usual = CharacterSettings()
+
+    def own(name: str) -> Any:
+        values = getattr(options, name)
+        return values[min(number, len(values) - 1)] if values else getattr(usual, name)
+
+    return CharacterSettings(
+        cartoon=own("cartoon"),
+        volume_gain=own("volume_gain"),
+        stiffness=own("stiffness"),
+        energy=own("energy"),
+        iterations=options.iterations,
+    )
+
+
+def _remote(options: argparse.Namespace) -> RemoteSettings | None:
+    if options.remote is None:
+        if options.remote_feedback is not None:
+            raise InputError("--remote-feedback answers a remote control: add --remote")
+        return None
+    return RemoteSettings(options.remote, options.remote_feedback)
+
+
 def _add_stage(parser: argparse.ArgumentParser) -> None:
     show = parser.add_argument_group("the show")
-    show.add_argument("--headless", action="store_true", help="no window")
-    show.add_argument("--size", type=size, default=(960, 540), metavar="WxH", help="of the picture")
+    show.add_argument("--headless", action="store_true", help="open no window")
     show.add_argument(
-        "--fast", action="store_true", help="as fast as it can, every frame exactly once"
+        "--size",
+        type=size,
+        default=(960, 540),
+        metavar="WxH",
+        help="width and height of the picture in pixels (default 960x540; demo 1280x560)",
     )
-    show.add_argument("--speed", type=positive, default=1.0, metavar="X", help="times the recorded")
-    show.add_argument("--loop", action="store_true", help="start again after the last frame")
+    show.add_argument(
+        "--fast",
+        action="store_true",
+        help="perform every frame exactly once, as fast as possible",
+    )
+    show.add_argument(
+        "--speed",
+        type=positive,
+        default=1.0,
+        metavar="X",
+        help="play a recording X times as fast as it was recorded (default 1)",
+    )
+    show.add_argument(
+        "--loop", action="store_true", help="start a recording again after its last frame"
+    )
     behind = show.add_mutually_exclusive_group()
-    behind.add_argument("--transparent", action="store_true", help="no stage behind the character")
+    behind.add_argument(
+        "--transparent", action="store_true", help="draw no stage behind the characters"
+    )
     behind.add_argument(
         "--background",
         type=colour,
         metavar="COLOUR|chroma",
-        help="a plain colour such as #203040 instead of the stage; chroma is the green to key out",
+        help="draw a plain colour such as #203040 in place of the stage; chroma is a green that is "
+        "easy to key out",
     )
     show.add_argument(
-        "--plain", action="store_true", help="without the matched chains and the mirror"
+        "--plain",
+        action="store_true",
+        help="draw neither the matched chains nor the performer's small picture",
     )
 
 
 def _add_remote(parser: argparse.ArgumentParser) -> None:
-    show = parser.add_argument_group("who runs it from afar")
+    show = parser.add_argument_group("remote control")
     show.add_argument(
         "--remote",
         type=remote_address,
         metavar="HOST:PORT",
-        help="let OSC run the show, as in 127.0.0.1:9100, or 0.0.0.0:9100 for a phone",
+        help="accept OSC messages at this address: 127.0.0.1:9100 for programs on this machine, "
+        "0.0.0.0:9100 for a phone",
     )
     show.add_argument(
         "--remote-feedback",
         type=port_number,
         metavar="PORT",
-        help="where the phone listens; the port that it sends from if absent",
+        help="send states to this port of the phone (default: the port that it sends from)",
     )
 
 
 def _add_conditioning(parser: argparse.ArgumentParser) -> None:
-    stream = parser.add_argument_group("what is done to the stream first")
+    stream = parser.add_argument_group("corrections of the performer's frames")
     for name, text in CONDITIONING.items():
         stream.add_argument(f"--{name}", action=argparse.BooleanOptionalAction, help=text)
 
 
 def _add_match(parser: argparse.ArgumentParser) -> None:
-    match = parser.add_argument_group("who drives what")
+    match = parser.add_argument_group("matching the performer to the characters")
     match.add_argument(
         "--source",
         default="whole",
         metavar="PRESET|JOINTS",
         help="the part of the performer that drives: whole, upper, arms, legs, left-arm, "
-        "right-arm, hand, ... or joint names with commas between",
+        "right-arm, hand, ... or joint names separated by commas (default whole)",
     )
     match.add_argument(
         "--performers",
         type=counting,
         default=1,
         metavar="N",
-        help="who comes as number K drives character K; the last of N all that are left "
-        "(default 1: who comes first drives all)",
+        help="number of performers: performer K drives character K, and the last performer also "
+        "drives all remaining characters (default 1)",
     )
     match.add_argument(
-        "--match", type=counting, default=1, metavar="N", help="take the N-th best match"
+        "--match",
+        type=counting,
+        default=1,
+        metavar="N",
+        help="use the N-th best match (default 1)",
     )
     match.add_argument(
-        "--mapping", type=Path, metavar="FILE.json", help="joints and nodes paired by hand"
+        "--mapping",
+        type=Path,
+        metavar="FILE.json",
+        help="use the pairs of joints and nodes in this file; see docs/mapping.md",
     )
     match.add_argument(
         "--chains",
         choices=("extend", "stop"),
         default="extend",
-        help="drive a matched chain on to its longest leaf, or stop at the sub-tree's root",
+        help="drive a matched chain to its longest leaf, or only to the root of the sub-tree "
+        "(default extend)",
     )
-    match.add_argument("--flip", action="store_true", help="mirror the turns (flip the y-axis)")
+    match.add_argument(
+        "--flip", action="store_true", help="mirror the turns by flipping the y-axis"
+    )
     match.add_argument(
         "--iterations",
         type=counting,
         default=2,
         metavar="N",
-        help="ARAP iterations a frame, the last of several after it is shown (default 2)",
+        help="ARAP iterations per frame; if N is 2 or more, the last one runs after the frame is "
+        "shown (default 2)",
     )
 
 
-def _add_matter(parser: argparse.ArgumentParser) -> None:
+def _add_deformation(parser: argparse.ArgumentParser) -> None:
     made = parser.add_argument_group(
-        "what characters are made of",
-        "each may be repeated: the first is for the first character, the last for all that follow",
+        "deformation of the characters",
+        "Each option may be repeated, once for each character; the last value also applies to all "
+        "remaining characters.",
     )
     made.add_argument(
         "--cartoon",
@@ -143,33 +288,50 @@ def _add_matter(parser: argparse.ArgumentParser) -> None:
         action="append",
         type=gain,
         metavar="X",
-        help="how much of the volume is kept when it does; more than 1 exaggerates (default 1)",
+        help="share of the volume that is kept while a part squashes and stretches; more than 1 "
+        "exaggerates (default 1)",
     )
     made.add_argument(
         "--stiffness",
         action="append",
         type=stiffness,
         metavar="X",
-        help="0 (default) lets limbs bend all along, towards 1 they bend at their joints only",
+        help="0 (default) lets limbs bend along their whole length; the nearer to 1, the more they "
+        "bend at their joints only",
     )
     made.add_argument(
         "--energy",
         action="append",
-        choices=("spokes", "spokes-and-rims", "smooth-rotations"),
-        help="what is kept as rigid as possible (default spokes)",
+        choices=ENERGIES,
+        help="what the solver keeps as rigid as possible (default spokes); see docs/deformation.md",
     )
 
 
 def _add_files(parser: argparse.ArgumentParser) -> None:
-    keep = parser.add_argument_group("what is kept")
-    keep.add_argument("--video", type=Path, metavar="OUT.mp4")
+    keep = parser.add_argument_group("files to write")
     keep.add_argument(
-        "--fps", type=positive, default=60.0, metavar="X", help="of video and cameras, at most"
+        "--video",
+        type=Path,
+        metavar="OUT.mp4",
+        help="the pictures as a video: mp4, m4v, mov, mkv or webm",
     )
-    keep.add_argument("--frames", type=Path, metavar="DIR", help="a PNG for each frame")
-    keep.add_argument("--cache", type=Path, metavar="OUT.pc2", help="deformed vertices, for each")
-    keep.add_argument("--report", type=Path, metavar="OUT.json", help="the show in figures")
-    keep.add_argument("--record", type=Path, metavar="OUT.mcap", help="the performer's frames")
+    keep.add_argument(
+        "--fps",
+        type=positive,
+        default=60.0,
+        metavar="X",
+        help="pictures per second of videos and cameras, at most (default 60; demo 30)",
+    )
+    keep.add_argument("--frames", type=Path, metavar="DIR", help="a PNG of each frame")
+    keep.add_argument(
+        "--cache", type=Path, metavar="OUT.pc2", help="the deformed vertices of each frame"
+    )
+    keep.add_argument(
+        "--report", type=Path, metavar="OUT.json", help="match, times and quality in figures"
+    )
+    keep.add_argument(
+        "--record", type=Path, metavar="OUT.mcap", help="the performer's frames as they arrived"
+    )
     keep.add_argument(
         "--export",
         type=Path,
@@ -179,34 +341,37 @@ def _add_files(parser: argparse.ArgumentParser) -> None:
 
 
 def _add_other_programs(parser: argparse.ArgumentParser) -> None:
-    send = parser.add_argument_group("what other programs are given")
+    send = parser.add_argument_group("sending to other programs")
     send.add_argument(
         "--virtual-camera",
         nargs="?",
         const="",
         metavar="NAME",
-        help="pictures to a virtual camera, the first there is if not named",
+        help="send the pictures to this virtual camera, or to the first one if NAME is missing",
     )
-    send.add_argument("--ndi", metavar="NAME", help="pictures over the network, by NDI")
+    send.add_argument(
+        "--ndi", metavar="NAME", help="send the pictures over the network under this NDI name"
+    )
     send.add_argument(
         "--spout",
         metavar="NAME",
-        help="pictures for programs on this machine, by Spout (Windows) or Syphon (macOS)",
+        help="share the pictures with programs on this machine by Spout (Windows) or Syphon "
+        "(macOS)",
     )
     send.add_argument(
         "--vmc",
         type=host_port,
         metavar="HOST:PORT",
-        help="send the lead performer as VMC; its receivers listen on port 39539",
+        help="send the first performer as VMC (default port 39539)",
     )
     send.add_argument(
         "--publish",
         metavar="tcp://HOST:PORT",
-        help="the performers for other shows, which open zmq+tcp://HOST:PORT",
+        help="publish the performers for other shows, which open zmq+tcp://HOST:PORT",
     )
     send.add_argument(
         "--publish-keys",
         type=Path,
         metavar="DIR",
-        help="for --publish beyond this machine; `bunraku bridge --make-keys` makes them",
+        help="keys for --publish to other machines; `bunraku bridge --make-keys DIR` makes them",
     )

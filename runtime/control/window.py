@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
+from weakref import WeakSet
 
 import glfw
 import moderngl
@@ -106,6 +107,7 @@ class Window:
         except InputError:
             glfw.destroy_window(self.handle)
             raise
+        _windows.add(self)
         self.camera: Camera = front_camera()
         self._events: list[Event] = []
         self._cursor = glfw.get_cursor_pos(self.handle)
@@ -133,6 +135,11 @@ class Window:
         """Whether the user asked to close the window."""
         return bool(glfw.window_should_close(self.handle))
 
+    def make_current(self) -> None:
+        """Make the window's context current on this thread, and no headless one."""
+        leave_headless()
+        glfw.make_context_current(self.handle)
+
     def poll(self) -> list[Event]:
         """Move the camera by the mouse; return all other events, oldest first."""
         glfw.poll_events()
@@ -148,6 +155,7 @@ class Window:
         if self.handle is not None:
             glfw.destroy_window(self.handle)
             self.handle = None
+            _windows.discard(self)
 
     def __enter__(self) -> Window:
         return self
@@ -187,6 +195,16 @@ class Window:
 
     def _on_resize(self, _: object, width: int, height: int) -> None:
         self._events.append(Resized((max(width, 1), max(height, 1))))
+
+
+_windows: WeakSet[Window] = WeakSet()
+
+
+def leave_windows() -> None:
+    """Make no window's context current: EGL refuses a thread on which one still is."""
+    if _windows:
+        nothing: Any = None  # which glfw takes, though its types do not say so
+        glfw.make_context_current(nothing)
 
 
 def _open_window(title: str, size: tuple[int, int], hints: Mapping[int, bool]) -> Any:

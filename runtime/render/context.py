@@ -45,6 +45,12 @@ def headless_context(*, libegl: str = "libEGL.so.1", libgl: str = "libGL.so.1") 
     )
 
 
+def make_current(context: moderngl.Context) -> None:
+    """Make a context current on this thread; no window's may be."""
+    enter: Callable[[], object] = context.__enter__
+    enter()
+
+
 def leave_headless() -> None:
     """Make no headless context current; otherwise X11 ends a process that opens a window."""
     for context in _headless:

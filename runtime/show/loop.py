@@ -127,6 +127,16 @@ class FrameLoop:
                 for puppet in act.puppets:
                     puppet.settle()
 
+    @property
+    def motions(self) -> Sequence[Motion]:
+        """Each puppet as it was performed last."""
+        return self._motions
+
+    def draw(self) -> None:
+        """Draw what was performed last, where there is a scene."""
+        if self._scene is not None:
+            self._scene.show(self._poses[0], self._motions)
+
     def hurry(self) -> None:
         """Leave the surfaces as they were shown: there is no time to settle them."""
         self._unsettled = False
@@ -135,7 +145,7 @@ class FrameLoop:
         """Go on showing what there is, though no frame has come: camera and light may change."""
         due = self._clock() - self._pictured_at >= self._picture_step
         if self._scene is not None and (self._shown or (due and self._screens)):
-            self._scene.show(self._poses[0], self._motions)
+            self.draw()
             if due and self._screens:
                 picture = self._scene.picture()
                 self._pictured_at = self._clock()

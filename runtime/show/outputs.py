@@ -1,25 +1,23 @@
-"""Which files a show writes: all of them known, and known to be possible, before it begins."""
+"""The files and senders of a show: checked before it begins, then opened for each character."""
 
 from __future__ import annotations
 
-import argparse
 import itertools
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
 from devices.errors import InputError
+from devices.skeleton import Skeleton
 from runtime.characters.character import Character
-from runtime.cli.bridge import open_publisher
-from runtime.driving.performer import Performer
 from runtime.output.files.export import SUFFIXES, open_export
 from runtime.output.files.frames import Frames
 from runtime.output.files.point_cache import PointCache
 from runtime.output.files.video import Video, encoder_for
 from runtime.output.files.whole_file import check_suffix, check_writable
 from runtime.output.live.bridge_performer import BridgePerformer
-from runtime.output.live.bridge_publisher import BoundEndpoint, binding
+from runtime.output.live.bridge_publisher import BoundEndpoint, BridgePublisher, binding
 from runtime.output.live.broadcast import Broadcast, Sender
 from runtime.output.live.ndi import NdiSender, import_cyndilib
 from runtime.output.live.shared_texture import import_shared_texture, open_shared_texture
@@ -28,33 +26,38 @@ from runtime.output.live.vmc_performer import PORT as VMC_PORT
 from runtime.output.live.vmc_performer import VmcPerformer
 from runtime.output.output import Output
 from runtime.output.report.report import CharacterReport
-from runtime.show.warn import warn
+from runtime.show.messages import say
+from runtime.show.settings import SenderSettings, ShowSettings
+
+OF_EACH_CHARACTER = ("cache", "export")
+"""Settings of files that several characters write one each of."""
 
 
-def check_outputs(options: argparse.Namespace) -> None:
-    """Make sure that every file of a show can be written, each once and over nothing it reads.
+def check_outputs(
+    settings: ShowSettings, characters: Sequence[str], read: Sequence[tuple[str, Path]] = ()
+) -> None:
+    """Make sure that every file and sender of a show can be opened.
+
+    Args:
+        settings: of the show.
+        characters: their names.
+        read: files that the show reads and must not write, each with the name of its option.
 
     Raises:
-        InputError: a folder is missing, a file cannot be written, a suffix is not known, two
-            options name one file, or what is published beyond this machine is not guarded.
+        InputError: a folder is missing, a file cannot be written, a suffix is unknown, two options
+            name one file, a library is missing, or an address beyond this machine has no keys.
     """
-    read = list(_read(options))
-    written = list(_written(options))
+    written = list(_written(settings, characters))
     for option, path in written:
         check_writable(path / "000000.png" if option == "--frames" and path.is_dir() else path)
-    if options.video is not None:
-        encoder_for(options.video)
-    if options.virtual_camera is not None:
-        import_pyvirtualcam()
-    if options.spout is not None:
-        import_shared_texture()
-    if options.ndi is not None:
-        import_cyndilib()
-    if options.publish is not None:
-        _publishing(options)
-    if options.export is not None:
-        check_suffix(options.export, SUFFIXES)
-    for (option, path), (other, taken) in itertools.combinations(read + written, 2):
+    if settings.files.video is not None:
+        encoder_for(settings.files.video)
+    if settings.files.export is not None:
+        check_suffix(settings.files.export, SUFFIXES)
+    _check_senders(settings.senders)
+    if settings.match.mapping is not None:
+        read = [*read, ("--mapping", settings.match.mapping)]
+    for (option, path), (other, taken) in itertools.combinations([*read, *written], 2):
         if (other, taken) in written and _same(path, taken):
             raise InputError(
                 f"{other} cannot write {taken}: {option} is the same file; give each its own"
@@ -62,109 +65,123 @@ def check_outputs(options: argparse.Namespace) -> None:
 
 
 def open_outputs(
-    options: argparse.Namespace,
-    cast: Sequence[tuple[Character, CharacterReport]],
-    performers: Sequence[Performer],
+    settings: ShowSettings,
+    characters: Sequence[tuple[Character, CharacterReport]],
+    performer: Skeleton,
     rate: float,
     closing: ExitStack,
+    *,
+    warn: Callable[[str], None],
 ) -> list[list[Output]]:
-    """What keeps each character's performance; the pictures of all go with the first.
+    """Open the outputs of each character; those of the pictures go with the first.
 
     Args:
-        options: of the command line.
-        cast: the characters, each with its part of the report.
-        performers: who drive them, the lead first.
+        settings: of the show.
+        characters: each with its part of the report.
+        performer: the skeleton of all performers.
         rate: about how many frames a second will come.
         closing: closes what was opened.
+        warn: takes a line about a sender that fails during the show.
 
     Raises:
-        InputError: a suffix is not known, a library is missing, or a file cannot be written.
+        InputError: a suffix is unknown, a library is missing, or a file cannot be written.
     """
-    names = _names(options.character)
+    files, senders = settings.files, settings.senders
+    names = distinct_names([character.name for character, _ in characters])
     outputs: list[list[Output]] = []
-    for name, (character, part) in zip(names, cast, strict=True):
-        kept: list[Output] = [part]
-        if options.export is not None:
-            export = open_export(_of(options.export, name, names), character, rate=rate)
-            kept.append(closing.enter_context(export))
-        if options.cache is not None:
-            cache = PointCache(_of(options.cache, name, names), character)
-            kept.append(closing.enter_context(cache))
-        outputs.append(kept)
-    if options.video is not None:
-        video = Video(options.video, rate=rate, pictures_a_second=options.fps)
+    for name, (character, part) in zip(names, characters, strict=True):
+        own: list[Output] = [part]
+        if files.export is not None:
+            export = open_export(_of(files.export, name, names), character, rate=rate)
+            own.append(closing.enter_context(export))
+        if files.cache is not None:
+            cache = PointCache(_of(files.cache, name, names), character)
+            own.append(closing.enter_context(cache))
+        outputs.append(own)
+    if files.video is not None:
+        video = Video(files.video, rate=rate, pictures_a_second=settings.fps)
         outputs[0].append(closing.enter_context(video))
-    if options.frames is not None:
-        outputs[0].append(closing.enter_context(Frames(options.frames)))
-    for broadcast in _open_broadcasts(options):
+    if files.frames is not None:
+        outputs[0].append(closing.enter_context(Frames(files.frames)))
+    for broadcast in _open_broadcasts(settings, warn):
         outputs[0].append(closing.enter_context(broadcast))
-    if options.publish is not None:
-        publisher = open_publisher(_publishing(options), performers[0].skeleton)
+    if senders.publish is not None:
+        publisher = open_publisher(_endpoint(senders), performer)
         outputs[0].append(closing.enter_context(BridgePerformer(publisher)))
-    if options.vmc is not None:
-        host, port = options.vmc
-        lead = VmcPerformer(performers[0].skeleton, host, port or VMC_PORT)
-        outputs[0].append(closing.enter_context(lead))
+    if senders.vmc is not None:
+        host, port = senders.vmc
+        first = VmcPerformer(performer, host, port or VMC_PORT)
+        outputs[0].append(closing.enter_context(first))
     return outputs
 
 
-def needs_pictures(options: argparse.Namespace) -> bool:
-    """Whether anything that a show writes or sends is made of pictures."""
-    asked = (options.video, options.frames, options.virtual_camera, options.spout, options.ndi)
-    return any(option is not None for option in asked)
+def open_publisher(endpoint: BoundEndpoint, skeleton: Skeleton) -> BridgePublisher:
+    """Open a publisher that says where it can be reached, and which subscribers come and go.
+
+    Raises:
+        InputError: the address cannot be bound.
+    """
+    publisher = BridgePublisher(endpoint, skeleton, tell=say)
+    say(f"sending to whoever opens zmq+{publisher.endpoint}")
+    return publisher
 
 
-def _open_broadcasts(options: argparse.Namespace) -> Iterator[Broadcast]:
-    """What takes pictures to other programs, each opened as it is asked for."""
-    size, rate = options.size, options.fps
+def distinct_names(characters: Sequence[str]) -> list[str]:
+    """The names of the characters' files; a name that comes again is numbered."""
+    names: list[str] = []
+    met: Counter[str] = Counter()
+    for character in characters:
+        met[character] += 1
+        count = met[character]
+        names.append(character if count == 1 else f"{character}-{count}")
+    return names
+
+
+def _check_senders(senders: SenderSettings) -> None:
+    if senders.virtual_camera is not None:
+        import_pyvirtualcam()
+    if senders.spout is not None:
+        import_shared_texture()
+    if senders.ndi is not None:
+        import_cyndilib()
+    if senders.publish is not None:
+        _endpoint(senders)
+
+
+def _open_broadcasts(settings: ShowSettings, warn: Callable[[str], None]) -> Iterator[Broadcast]:
+    """Open each sender of pictures that the settings ask for."""
+    senders, size, rate = settings.senders, settings.size, settings.fps
 
     def broadcast(name: str, sender: Sender) -> Broadcast:
         return Broadcast(name, sender, size, rate, tell=warn)
 
-    if options.virtual_camera is not None:
-        camera = VirtualCamera(options.virtual_camera, size, rate)
+    if senders.virtual_camera is not None:
+        camera = VirtualCamera(senders.virtual_camera, size, rate)
         yield broadcast("the virtual camera", camera)
-    if options.spout is not None:
-        yield broadcast("the shared picture", open_shared_texture(options.spout, size))
-    if options.ndi is not None:
-        sender = NdiSender(options.ndi, size, rate, alpha=options.transparent)
+    if senders.spout is not None:
+        yield broadcast("the shared picture", open_shared_texture(senders.spout, size))
+    if senders.ndi is not None:
+        sender = NdiSender(senders.ndi, size, rate, alpha=settings.transparent)
         yield broadcast("NDI", sender)
 
 
-def _publishing(options: argparse.Namespace) -> BoundEndpoint:
-    return binding(options.publish, options.publish_keys, option="--publish-keys DIR/capture")
+def _endpoint(senders: SenderSettings) -> BoundEndpoint:
+    assert senders.publish is not None
+    return binding(senders.publish, senders.publish_keys, option="--publish-keys DIR/capture")
 
 
-def _read(options: argparse.Namespace) -> Iterator[tuple[str, Path]]:
-    """Each file that the show reads, and what the command line calls it."""
-    if getattr(options, "recording", None) is not None:
-        yield "RECORDING", options.recording
-    for name in options.character:
-        yield "--character", Path(name)
-    if options.mapping is not None:
-        yield "--mapping", options.mapping
-
-
-def _written(options: argparse.Namespace) -> Iterator[tuple[str, Path]]:
-    """Each file and folder that the show writes, and the option that asks for it."""
-    names = _names(options.character)
+def _written(settings: ShowSettings, characters: Sequence[str]) -> Iterator[tuple[str, Path]]:
+    """Each file and folder that the show writes, with the name of its option."""
+    names = distinct_names(characters)
     for option in ("video", "frames", "cache", "report", "record", "export"):
-        path: Path | None = getattr(options, option)
-        if path is not None:
-            for name in names if option in ("cache", "export") else names[:1]:
-                own = _of(path, name, names) if option in ("cache", "export") else path
-                yield f"--{option}", own
-
-
-def _names(characters: Sequence[str]) -> list[str]:
-    """What tells the characters' files apart: their names, numbered where one comes again."""
-    names: list[str] = []
-    met: Counter[str] = Counter()
-    for character in characters:
-        stem = Path(character).stem
-        met[stem] += 1
-        names.append(stem if met[stem] == 1 else f"{stem}-{met[stem]}")
-    return names
+        path: Path | None = getattr(settings.files, option)
+        if path is None:
+            continue
+        if option not in OF_EACH_CHARACTER:
+            yield f"--{option}", path
+            continue
+        for name in names:
+            yield f"--{option}", _of(path, name, names)
 
 
 def _of(path: Path, name: str, names: Sequence[str]) -> Path:

@@ -122,6 +122,27 @@ class SpareTime:
             self._surfaces.hurry()
 
 
+@runtime_checkable
+class FrameByFrame(Protocol):
+    """A stream that may give exactly one frame a poll and lets its frames wait for the loop."""
+
+    @property
+    def every_frame(self) -> bool:
+        """Whether it does so now."""
+        ...
+
+
+def loses_no_frame(stream: SkeletonStream) -> bool:
+    """Whether the frames of a stream wait for the loop, however long it takes."""
+    return isinstance(stream, FrameByFrame) and stream.every_frame
+
+
 def pace_of(stream: SkeletonStream) -> Pace:
-    """On arrival where the stream can be waited for, else `TICKS` a second."""
+    """The pace that suits a stream.
+
+    One tick right after the other where its frames wait for the loop, on arrival where the loop can
+    wait for its frames, else `TICKS` a second.
+    """
+    if loses_no_frame(stream):
+        return AtOnce()
     return OnArrival(stream) if isinstance(stream, Waking) else Ticker(TICKS)

@@ -1,30 +1,27 @@
-"""Where a recording's frames came from, for whoever finds the file later."""
+"""Facts for the head of a recording: where its frames came from, and when."""
 
 from __future__ import annotations
 
 import time
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 from urllib.parse import urlsplit
+
+from runtime.version import program_version
 
 
 def provenance(origin: str) -> dict[str, str]:
-    """Facts for the head of a recording that begins now.
+    """Return the facts of a recording that begins now.
 
     Args:
-        origin: the device's address, of which a password is left out, or the name of a file.
+        origin: the device's address, whose password is left out, or the name of a file.
 
     Returns:
-        ``origin``, ``program``, and the same moment on two clocks: ``began``, UTC as ISO 8601, and
-        ``host_clock`` [s], the monotonic clock of the frames, so that frames can be dated.
+        ``origin``; ``program``; ``began``, now in UTC as ISO 8601; and ``host_clock`` [s], now on
+        the monotonic clock of the frames, so that each frame has a date.
     """
-    try:
-        program = f"bunraku {version('bunraku')}"
-    except PackageNotFoundError:
-        program = "bunraku"
     return {
         "origin": _without_password(origin),
-        "program": program,
+        "program": f"bunraku {program_version()}",
         "began": datetime.now(UTC).isoformat(timespec="milliseconds"),
         "host_clock": f"{time.perf_counter():.6f}",
     }

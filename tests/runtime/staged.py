@@ -1,4 +1,4 @@
-"""A whole show in a test's hands: all of it the real thing but the clock and the window."""
+"""A show in a test's hands: all of it the real thing but the clock of the lights and the window."""
 
 from __future__ import annotations
 
@@ -9,25 +9,14 @@ from typing import Self
 import moderngl
 from numpy.typing import NDArray
 
-from devices.builtin.simulator import Simulator
-from replay.playback import playback_of
-from replay.player import Player
-from replay.recorded_stream import RecordedStream
-from replay.recorder import Recorder
-from runtime.conditioning.switches import Conditioning
-from runtime.control.actions import ShowControls
+from devices.stream import SkeletonStream
+from runtime.characters.character import Character
+from runtime.conditioning.switches import SWITCHES
 from runtime.driving.mapping import Mapping
-from runtime.driving.match_session import MatchSession
-from runtime.driving.performer import Performer
-from runtime.driving.puppet_match import Choices
 from runtime.output.output import PerformedFrame
-from runtime.output.report.report import Report
-from runtime.puppet.deformable_surface import Elasticity
-from runtime.puppet.puppet import Puppet
-from runtime.show.loop import FrameLoop
-from runtime.show.scene import Scene
-from runtime.show.takes import Takes
-from tests.runtime.stick_figures import BODY, FRONT_VIEW, T_POSE, frame, pose
+from runtime.show.settings import FileSettings, MatchSettings, ShowSettings
+from runtime.show.show import Show
+from tests.runtime.stick_figures import T_POSE, frame, pose
 
 SIZE = (64, 36)
 
@@ -54,65 +43,45 @@ class Seen:
     def __exit__(self, *exc: object) -> None: ...
 
 
-class Show:
-    """One puppet and one performer, who may be a recording or the simulator.
+class StagedShow(Show):
+    """One character and one performer, whose matches stand until they are accepted.
 
     Attributes:
         now: what the clock of the lights says [s].
-        told: lines for whoever runs the show.
+        told: lines for the operator of the show.
+        seen: its vertices and pictures.
     """
 
     def __init__(
         self,
         context: moderngl.Context,
-        puppet: Puppet,
-        stream: Player | Simulator,
+        character: Character,
+        stream: SkeletonStream,
         folder: Path,
     ) -> None:
-        puppet.rest()
-        puppet.surface.elasticity = Elasticity()
-        puppet.surface.reset()
         self.now = 0.0
         self.told: list[str] = []
         self.seen = Seen()
-        self.puppet = puppet
-        self.stream = stream
-        recorded = RecordedStream(stream)
-        self.performer = Performer(BODY)
-        self.match_session = MatchSession(
-            self.performer, [puppet], lambda: FRONT_VIEW, Choices(patience=math.inf), [None]
+        super().__init__(
+            stream,
+            [character],
+            ShowSettings(
+                size=SIZE,
+                match=MatchSettings(rehearse=False, patience=math.inf),
+                conditioning=dict.fromkeys(SWITCHES, False),
+                files=FileSettings(takes=folder / "out.mcap"),
+            ),
+            outputs=[self.seen],
+            context=context,
+            clock=lambda: self.now,
+            warn=self.told.append,
         )
-        self.scene = Scene(context, SIZE, [puppet], BODY, clock=lambda: self.now)
-        self.switches = Conditioning()
-        self.loop = FrameLoop(
-            recorded,
-            self.performer,
-            [puppet],
-            match_session=self.match_session,
-            report=Report(None),
-            scene=self.scene,
-            outputs=[[self.seen]],
-        )
-        self.takes = Takes(
-            recorded,
-            folder / "out.mcap",
-            lambda path: Recorder(path, BODY, tell=self.told.append),
-            tell=self.told.append,
-            waits=True,
-        )
-        self.controls = ShowControls(
-            cues=self.match_session,
-            conditioning=self.switches,
-            loop=self.loop,
-            surfaces=[puppet.surface],
-            takes=self.takes,
-            playback=playback_of(recorded),
-            scene=self.scene,
-        )
-
-    def close(self) -> None:
-        self.takes.close()
-        self.scene.close()
+        (self.act,) = self.acts
+        (self.puppet,) = self.puppets
+        self.performer, self.match_session = self.act.performer, self.act.match_session
+        self.stream, self.loop = stream, self.controls.loop
+        self.takes, self.switches = self.controls.takes, self.controls.conditioning
+        self.scene = self.controls.scene
 
     def strike(self, time: float = 0.0) -> Mapping:
         """Let the performer stand in a T pose for a moment; the mapping that is shown."""

@@ -21,7 +21,7 @@ from replay.builtin import builtin_recording
 from replay.formats import read_recording
 from replay.mcap.writer import McapWriter
 from runtime.characters.builtin import builtin_character
-from runtime.show.interrupt import held, interruptible
+from runtime.show.interrupts import interruptible, interrupts_deferred
 
 FRAMES = 12
 CHARACTER = "mannequin"
@@ -527,8 +527,8 @@ def test_a_held_block_is_finished_first() -> None:
     done = []
 
     def work() -> None:
-        with interruptible(), held():
-            with held():
+        with interruptible(), interrupts_deferred():
+            with interrupts_deferred():
                 signal.raise_signal(signal.SIGTERM)
                 done.append("inner")
             done.append("outer")
@@ -542,7 +542,7 @@ def test_a_held_block_is_finished_first() -> None:
 @posix_only
 def test_signals_are_handled_as_before_afterwards() -> None:
     before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
-    with interruptible(), held():
+    with interruptible(), interrupts_deferred():
         pass
     assert [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)] == before
 

@@ -24,8 +24,8 @@ from devices.stream import ADAPTERS
 from devices.transport.port_owner import port_owner
 from devices.transport.udp import QUEUE
 from runtime.cli import main
-from runtime.cli.devices import PLACES, State, listening_ports, watch
-from runtime.cli.doctor import EXTRAS, udp_queue
+from runtime.cli.device_watch import PLACES, State, listening_ports, watch
+from runtime.cli.health_checks import EXTRAS, udp_queue
 from runtime.render.egl import egl_devices
 from tests.devices.sender_packets import XSENS, bones, mxtp02, packed, posed, rokoko_v3
 from tests.devices.vmc_sender import slime

@@ -12,44 +12,46 @@ import pytest
 from devices.stream import open_stream
 from replay.formats import read_recording
 from replay.player import EveryFrame, Player
+from runtime.characters.character import Character
 from runtime.conditioning.switches import SWITCHES
 from runtime.control.actions import ACTIONS, SLIDERS
 from runtime.control.keys import KEYS
 from runtime.puppet.deformable_surface import Elasticity
-from runtime.puppet.puppet import Puppet
 from runtime.show.scene import BLACKOUT
-from tests.runtime.staged import Show
+from tests.runtime.staged import StagedShow
 from tests.runtime.stick_figures import frame, make_figure, pose, record, waving
 
 FADERS = {"cartoon": "cartoon", "volume": "volume_gain", "stiffness": "stiffness"}
 
 
 @pytest.fixture(scope="module")
-def puppet() -> Puppet:
-    return Puppet(make_figure())
+def character() -> Character:
+    return make_figure()
 
 
 @pytest.fixture
-def show(context: moderngl.Context, puppet: Puppet, tmp_path: Path) -> Iterator[Show]:
-    show = Show(context, puppet, Player(record(waving(40)), EveryFrame(), loop=True), tmp_path)
+def show(context: moderngl.Context, character: Character, tmp_path: Path) -> Iterator[StagedShow]:
+    show = StagedShow(
+        context, character, Player(record(waving(40)), EveryFrame(), loop=True), tmp_path
+    )
     yield show
     show.close()
 
 
-def press(show: Show, *names: str) -> None:
+def press(show: StagedShow, *names: str) -> None:
     for name in names:
         ACTIONS[name].press(show.controls)
 
 
-def put(show: Show, name: str, value: float) -> None:
+def put(show: StagedShow, name: str, value: float) -> None:
     ACTIONS[name].write(show.controls, value)
 
 
-def light(show: Show, name: str) -> float:
+def light(show: StagedShow, name: str) -> float:
     return ACTIONS[name].read(show.controls)
 
 
-def perform(show: Show) -> None:
+def perform(show: StagedShow) -> None:
     """Let a match stand, accept it, and the show go on for a few frames."""
     show.loop.tick()
     show.strike()
@@ -90,7 +92,7 @@ def test_the_documented_table_is_the_table() -> None:
     assert rows == table
 
 
-def test_a_match_is_accepted_and_looked_for_again(show: Show) -> None:
+def test_a_match_is_accepted_and_looked_for_again(show: StagedShow) -> None:
     press(show, "accept")
     assert show.match_session.matching, "nothing was shown yet"
     assert light(show, "match-again") == 1.0
@@ -105,7 +107,7 @@ def test_a_match_is_accepted_and_looked_for_again(show: Show) -> None:
     assert show.match_session.matching
 
 
-def test_matches_are_stepped_through(show: Show) -> None:
+def test_matches_are_stepped_through(show: StagedShow) -> None:
     best = show.strike().drives
     press(show, "next-match")
     second = show.strike(0.1).drives
@@ -123,7 +125,7 @@ def test_matches_are_stepped_through(show: Show) -> None:
 
 
 @pytest.mark.parametrize("name", ["rest-pose", "calibrate"])
-def test_the_pose_becomes_the_rest_state(show: Show, name: str) -> None:
+def test_the_pose_becomes_the_rest_state(show: StagedShow, name: str) -> None:
     show.strike()
     press(show, "accept", name)
     bent = pose({"ElbowLeft": (0.0, 0.0, 1.2)})
@@ -136,7 +138,7 @@ def test_the_pose_becomes_the_rest_state(show: Show, name: str) -> None:
     np.testing.assert_allclose(show.puppet.deform().vertices, rest, atol=1e-6)
 
 
-def test_a_recording_is_held_and_goes_on(show: Show) -> None:
+def test_a_recording_is_held_and_goes_on(show: StagedShow) -> None:
     assert len(show.stream.poll()) == 1
     for hold, go_on in (("hold", "hold"), ("pause", "play")):
         press(show, hold)
@@ -153,7 +155,7 @@ def test_a_recording_is_held_and_goes_on(show: Show) -> None:
     np.testing.assert_array_equal(captured.positions, show.stream.recording.positions[1])
 
 
-def test_home_goes_back_to_the_start(show: Show) -> None:
+def test_home_goes_back_to_the_start(show: StagedShow) -> None:
     for _ in range(4):
         last = show.stream.poll()[0].time
     press(show, "home")
@@ -163,10 +165,10 @@ def test_home_goes_back_to_the_start(show: Show) -> None:
 
 
 def test_a_live_source_is_neither_held_nor_wound_back(
-    context: moderngl.Context, puppet: Puppet, tmp_path: Path
+    context: moderngl.Context, character: Character, tmp_path: Path
 ) -> None:
     with open_stream("sim://wave") as stream:
-        show = Show(context, puppet, stream, tmp_path)
+        show = StagedShow(context, character, stream, tmp_path)
         press(show, "hold", "pause", "play", "home")
         assert light(show, "play") == 1.0
         assert len(stream.poll()) > 0
@@ -175,7 +177,7 @@ def test_a_live_source_is_neither_held_nor_wound_back(
 
 
 def test_takes_are_new_files_with_the_frames_between_start_and_stop(
-    show: Show, tmp_path: Path
+    show: StagedShow, tmp_path: Path
 ) -> None:
     (tmp_path / "out.mcap").write_bytes(b"the recording of the whole show")
     (tmp_path / "out-2.mcap").write_bytes(b"somebody's own")
@@ -197,10 +199,10 @@ def test_takes_are_new_files_with_the_frames_between_start_and_stop(
 
 
 def test_a_take_that_cannot_be_begun_is_told_and_the_show_goes_on(
-    context: moderngl.Context, puppet: Puppet, tmp_path: Path
+    context: moderngl.Context, character: Character, tmp_path: Path
 ) -> None:
     player = Player(record(waving(9)), EveryFrame())
-    show = Show(context, puppet, player, tmp_path / "nowhere")
+    show = StagedShow(context, character, player, tmp_path / "nowhere")
     press(show, "record")
     assert light(show, "record") == 0.0
     assert len(show.told) == 1
@@ -209,7 +211,9 @@ def test_a_take_that_cannot_be_begun_is_told_and_the_show_goes_on(
     show.close()
 
 
-def test_frozen_characters_hold_while_frames_and_takes_go_on(show: Show, tmp_path: Path) -> None:
+def test_frozen_characters_hold_while_frames_and_takes_go_on(
+    show: StagedShow, tmp_path: Path
+) -> None:
     perform(show)
     assert np.abs(show.seen.vertices[-1] - show.seen.vertices[-2]).max() > 1e-4, "it moves"
     press(show, "freeze", "record")
@@ -227,7 +231,7 @@ def test_frozen_characters_hold_while_frames_and_takes_go_on(show: Show, tmp_pat
     assert len(read_recording(tmp_path / "out-1.mcap")) == 5
 
 
-def test_a_match_asked_for_while_frozen_is_shown_afterwards(show: Show) -> None:
+def test_a_match_asked_for_while_frozen_is_shown_afterwards(show: StagedShow) -> None:
     show.loop.tick()
     shown = show.match_session.mappings[0].drives
     press(show, "freeze", "next-match")
@@ -238,7 +242,7 @@ def test_a_match_asked_for_while_frozen_is_shown_afterwards(show: Show) -> None:
     assert show.match_session.mappings[0].drives != shown
 
 
-def test_a_blackout_fades_pictures_to_black_and_back(show: Show) -> None:
+def test_a_blackout_fades_pictures_to_black_and_back(show: StagedShow) -> None:
     perform(show)
     press(show, "freeze", "blackout")  # frozen, so that only the light changes
     assert light(show, "blackout") == 1.0
@@ -259,14 +263,14 @@ def test_a_blackout_fades_pictures_to_black_and_back(show: Show) -> None:
     assert light(show, "blackout") == 0.0
 
 
-def test_everybody_is_framed(show: Show) -> None:
+def test_everybody_is_framed(show: StagedShow) -> None:
     framed = show.scene.camera
     show.scene.camera = framed.zoom(3.0)
     press(show, "frame-all")
     assert show.scene.camera.distance == pytest.approx(framed.distance)
 
 
-def test_chains_are_hidden_and_shown(show: Show) -> None:
+def test_chains_are_hidden_and_shown(show: StagedShow) -> None:
     press(show, "chains")
     assert not show.scene.highlights
     assert light(show, "chains") == 0.0
@@ -275,7 +279,7 @@ def test_chains_are_hidden_and_shown(show: Show) -> None:
 
 
 @pytest.mark.parametrize("name", SWITCHES)
-def test_each_step_of_the_conditioning_is_switched_by_itself(show: Show, name: str) -> None:
+def test_each_step_of_the_conditioning_is_switched_by_itself(show: StagedShow, name: str) -> None:
     before = {each: getattr(show.switches, each) for each in SWITCHES}
     press(show, name)
     turned = {each: getattr(show.switches, each) for each in SWITCHES}
@@ -288,7 +292,7 @@ def test_each_step_of_the_conditioning_is_switched_by_itself(show: Show, name: s
 
 
 @pytest.mark.parametrize("name", FADERS)
-def test_faders_set_what_every_character_is_made_of(show: Show, name: str) -> None:
+def test_faders_set_what_every_character_is_made_of(show: StagedShow, name: str) -> None:
     field = FADERS[name]
     for value in (0.0, 0.25, 1.0):
         put(show, name, value)
@@ -306,7 +310,7 @@ def test_faders_set_what_every_character_is_made_of(show: Show, name: str) -> No
     assert light(show, name) == 0.0
 
 
-def test_a_character_made_beyond_the_faders_end_is_left_so(show: Show) -> None:
+def test_a_character_made_beyond_the_faders_end_is_left_so(show: StagedShow) -> None:
     show.puppet.surface.elasticity = Elasticity(volume_gain=5.0)
     press(show, "volume-up")
     assert show.puppet.surface.elasticity.volume_gain == 5.0
@@ -314,7 +318,7 @@ def test_a_character_made_beyond_the_faders_end_is_left_so(show: Show) -> None:
     assert show.puppet.surface.elasticity.volume_gain == pytest.approx(0.9 * SLIDERS["volume"].most)
 
 
-def test_more_cartoon_changes_what_is_performed(show: Show) -> None:
+def test_more_cartoon_changes_what_is_performed(show: StagedShow) -> None:
     perform(show)
     press(show, "home")
     shapes = []
@@ -327,12 +331,14 @@ def test_more_cartoon_changes_what_is_performed(show: Show) -> None:
     assert np.abs(shapes[0] - shapes[1]).max() > 1e-4
 
 
-def test_leaving_is_asked_for(show: Show) -> None:
+def test_leaving_is_asked_for(show: StagedShow) -> None:
     press(show, "leave")
     assert show.controls.leaving
 
 
-def test_without_a_theatre_what_is_seen_cannot_be_changed_and_harms_nothing(show: Show) -> None:
+def test_without_a_theatre_what_is_seen_cannot_be_changed_and_harms_nothing(
+    show: StagedShow,
+) -> None:
     show.controls.scene = None
     press(show, "blackout", "chains", "frame-all")
     assert light(show, "blackout") == light(show, "chains") == 0.0

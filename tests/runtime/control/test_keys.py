@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from replay.player import EveryFrame, Player
+from runtime.characters.character import Character
 from runtime.control.actions import ACTIONS
 from runtime.control.keys import KEYS, WindowControls
 from runtime.control.window import Event, KeyPressed, Resized
-from runtime.puppet.puppet import Puppet
 from runtime.render.camera import Camera, front_camera
-from tests.runtime.staged import SIZE, Show
+from tests.runtime.staged import SIZE, StagedShow
 from tests.runtime.stick_figures import make_figure, record, waving
 
 
@@ -37,11 +37,11 @@ class Desktop:
         self.swaps += 1
 
 
-class Seat(Show):
+class Seat(StagedShow):
     """A show with somebody at the window."""
 
-    def __init__(self, context: moderngl.Context, puppet: Puppet, folder: Path) -> None:
-        super().__init__(context, puppet, Player(record(waving(9)), EveryFrame()), folder)
+    def __init__(self, context: moderngl.Context, character: Character, folder: Path) -> None:
+        super().__init__(context, character, Player(record(waving(9)), EveryFrame()), folder)
         self.window = Desktop(context)
         self.framed = self.scene.camera
         self.keys = WindowControls(self.window, self.scene, self.controls)
@@ -56,13 +56,13 @@ class Seat(Show):
 
 
 @pytest.fixture(scope="module")
-def puppet() -> Puppet:
-    return Puppet(make_figure())
+def character() -> Character:
+    return make_figure()
 
 
 @pytest.fixture
-def show(context: moderngl.Context, puppet: Puppet, tmp_path: Path) -> Iterator[Seat]:
-    show = Seat(context, puppet, tmp_path)
+def show(context: moderngl.Context, character: Character, tmp_path: Path) -> Iterator[Seat]:
+    show = Seat(context, character, tmp_path)
     yield show
     show.close()
 
@@ -76,12 +76,12 @@ def test_every_key_is_a_name_for_an_action_that_can_be_pressed() -> None:
 
 @pytest.mark.parametrize("key", KEYS)
 def test_a_key_does_what_its_action_does(
-    context: moderngl.Context, puppet: Puppet, tmp_path: Path, key: str
+    context: moderngl.Context, character: Character, tmp_path: Path, key: str
 ) -> None:
     """The same show twice, once by the key and once by the action: they end up alike."""
     states = []
     for by_key in (True, False):
-        show = Seat(context, puppet, tmp_path / str(by_key))
+        show = Seat(context, character, tmp_path / str(by_key))
         (tmp_path / str(by_key)).mkdir()
         show.strike()
         show.stream.poll()

@@ -18,6 +18,7 @@ from pythonosc.udp_client import SimpleUDPClient
 
 from devices.osc.messages import Message, write_bundles, write_message
 from replay.player import EveryFrame, Player
+from runtime.characters.character import Character
 from runtime.cli import main
 from runtime.control.actions import ACTIONS
 from runtime.control.remote import (
@@ -32,8 +33,7 @@ from runtime.control.remote import (
     _is_near,
     request_of,
 )
-from runtime.puppet.puppet import Puppet
-from tests.runtime.staged import Show
+from tests.runtime.staged import StagedShow
 from tests.runtime.stick_figures import make_figure, record, waving
 
 LOOPBACK = "127.0.0.1"
@@ -41,18 +41,18 @@ SOON = 30.0  # [s] after which a test is taken to hang
 
 
 @pytest.fixture(scope="module")
-def puppet() -> Puppet:
-    return Puppet(make_figure())
+def character() -> Character:
+    return make_figure()
 
 
-class Staged(Show):
-    """A show with a remote control, served after every tick as in `runtime.cli.show`."""
+class Staged(StagedShow):
+    """A show with a remote control, served after every tick as in `runtime.show.show`."""
 
     def __init__(
-        self, context: moderngl.Context, puppet: Puppet, folder: Path, answer_port: int = 0
+        self, context: moderngl.Context, character: Character, folder: Path, answer_port: int = 0
     ) -> None:
         super().__init__(
-            context, puppet, Player(record(waving(40)), EveryFrame(), loop=True), folder
+            context, character, Player(record(waving(40)), EveryFrame(), loop=True), folder
         )
         self.time = 0.0
         self.remote = Remote(
@@ -76,8 +76,8 @@ class Staged(Show):
 
 
 @pytest.fixture
-def show(context: moderngl.Context, puppet: Puppet, tmp_path: Path) -> Iterator[Staged]:
-    show = Staged(context, puppet, tmp_path)
+def show(context: moderngl.Context, character: Character, tmp_path: Path) -> Iterator[Staged]:
+    show = Staged(context, character, tmp_path)
     yield show
     show.close()
 
@@ -184,10 +184,10 @@ def test_a_show_is_run_from_a_phone_from_match_to_blackout(show: Staged) -> None
 
 
 def test_lights_follow_on_the_phones_own_port(
-    context: moderngl.Context, puppet: Puppet, tmp_path: Path
+    context: moderngl.Context, character: Character, tmp_path: Path
 ) -> None:
     with phone() as (server, lights):
-        show = Staged(context, puppet, tmp_path, answer_port=server.server_address[1])
+        show = Staged(context, character, tmp_path, answer_port=server.server_address[1])
         show.client.send_message("/bunraku/mirror", 1.0)
         show.until(lambda: lights.get("/bunraku/state/mirror") == 1.0)
         readable = {f"/bunraku/state/{name}" for name, a in ACTIONS.items() if a.read}

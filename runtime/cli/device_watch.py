@@ -1,0 +1,234 @@
+"""Listening at the addresses of devices for a while, for `bunraku devices`."""
+
+from __future__ import annotations
+
+import json
+import threading
+import time
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from enum import StrEnum
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+from urllib.parse import SplitResult, urlsplit
+
+import numpy as np
+
+from devices.errors import InputError
+from devices.stream import ADAPTERS, SkeletonStream, open_stream
+from devices.transport.port_owner import Owner, port_owner
+from devices.transport.traffic import Traffic
+from runtime.output.files.whole_file import whole_file
+
+PLACES = (
+    "sim://",
+    "vmc://127.0.0.1:39539",
+    "vmc://127.0.0.1:39540?role=performer",
+    "vrchat://127.0.0.1:9000",
+    "nimate://127.0.0.1:7000",
+    "nimate://127.0.0.1:7110",
+    "nimate://127.0.0.1:11011",
+    "rokoko://127.0.0.1:14043",
+    "xsens://127.0.0.1:9763",
+    "mediapipe://127.0.0.1:7005",
+    "mediapipe://webcam",
+    "kinect://v1",
+    "kinect://v2",
+    "kinect://azure",
+    "leap://",
+    "leap+ws://127.0.0.1:6437",
+    "zmq+tcp://127.0.0.1:5570",
+)
+"""The usual address of each kind of device, with the ports that its senders use by default."""
+
+LISTENS = ("vmc", "vrchat", "nimate", "rokoko", "xsens", "mediapipe")
+"""The kinds of device that open a UDP port of this machine."""
+
+POLL_STEP = 0.02  # [s] between two polls
+
+
+class State(StrEnum):
+    """The state of an address."""
+
+    ARRIVING = "arriving"
+    UNCLEAR = "unclear"  # packets arrive, but they hold no frames
+    SILENT = "silent"
+    TAKEN = "taken"
+    MISSING = "missing"
+    READY = "ready"
+
+
+@dataclass(slots=True)
+class Watch:
+    """One address and what arrived there.
+
+    Attributes:
+        address: as the user writes it.
+        state, detail: the line to print.
+        performers: the numbers of the performers whose frames arrived.
+        joints: the most joints that one frame had seen.
+        traffic: counts of packets and frames; None where nothing could be opened, or for a device
+            that is no live stream.
+        silence: [s] since the last packet.
+        owner: the process that has the port.
+    """
+
+    address: str
+    state: State = State.SILENT
+    detail: str = ""
+    performers: set[int] = field(default_factory=set)
+    joints: int = 0
+    traffic: Traffic | None = None
+    silence: float = float("nan")
+    owner: Owner | None = None
+
+
+def check_kind(address: str) -> None:
+    """Refuse an address of no known kind.
+
+    Raises:
+        InputError: it is one; the message lists the known kinds.
+    """
+    try:
+        scheme = urlsplit(address).scheme
+    except ValueError as error:
+        raise InputError(f"cannot open {address!r}: not an address ({error})") from error
+    if scheme not in ADAPTERS:
+        known = ", ".join(f"{kind}://" for kind in ADAPTERS)
+        raise InputError(f"cannot open {address!r}: no such kind of device; there are: {known}")
+
+
+def watch(addresses: Sequence[str], seconds: float) -> list[Watch]:
+    """Listen at all addresses at once for `seconds` [s]; one result for each, in their order."""
+    stop = threading.Event()
+    with ThreadPoolExecutor(len(addresses)) as pool:
+        try:
+            waiting = [pool.submit(_watch, address, seconds, stop) for address in addresses]
+            return [one.result() for one in waiting]
+        finally:
+            stop.set()  # Ctrl-C ends all of them
+
+
+def _watch(address: str, seconds: float, stop: threading.Event) -> Watch:
+    seen = Watch(address)
+    try:
+        stream = open_stream(_patient(urlsplit(address), seconds))
+    except InputError as error:
+        return _closed(seen, str(error))
+    with stream:
+        traffic = getattr(stream, "traffic", None)
+        if traffic is None:
+            seen.state, seen.detail = State.READY, "always there, 60 frames a second"
+            return seen
+        until = time.perf_counter() + seconds  # opening has its own time
+        while not stop.wait(min(POLL_STEP, max(until - time.perf_counter(), 0.0))):
+            _look(seen, stream)
+            if time.perf_counter() >= until:
+                break
+        seen.traffic = stream.traffic  # type: ignore[attr-defined]  # a live stream has it
+    return _told(seen, time.perf_counter(), seconds)
+
+
+def _patient(address: SplitResult, seconds: float) -> str:
+    """The address; for a bridge with the time to wait for it, unless the address has one."""
+    if address.scheme == "zmq+tcp" and "wait=" not in address.query:
+        return f"{address.geturl()}{'&' if address.query else '?'}wait={seconds}"
+    return address.geturl()
+
+
+def _look(seen: Watch, stream: SkeletonStream) -> None:
+    for frame in stream.poll():
+        seen.performers.add(frame.performer)
+        seen.joints = max(seen.joints, int(np.count_nonzero(frame.confidence)))
+
+
+def _closed(seen: Watch, reason: str) -> Watch:
+    """The result for an address that cannot be opened: a taken port, or something missing."""
+    address = urlsplit(seen.address)
+    seen.state, seen.detail = State.MISSING, reason.partition(": ")[2] or reason
+    port = port_of(seen.address)
+    if address.scheme in LISTENS and port and f"{port} is taken" in reason:
+        seen.state = State.TAKEN
+        seen.owner = port_owner(port, "tcp" if "transport=tcp" in address.query else "udp")
+    elif address.netloc == "webcam" and find_spec("mediapipe") is None:
+        seen.detail = "a webcam needs the extra: pip install 'bunraku[mediapipe]'"
+    elif address.scheme == "zmq+tcp" and "no bridge answers" in reason:
+        seen.state = State.SILENT
+    return seen
+
+
+def _told(seen: Watch, now: float, seconds: float) -> Watch:
+    traffic = seen.traffic
+    assert traffic is not None
+    seen.silence = now - traffic.last_seen
+    if traffic.frames:
+        seen.state = State.ARRIVING
+        people = len(seen.performers)
+        seen.detail = (
+            f"{traffic.rate / max(people, 1):.1f} Hz, jitter {1e3 * traffic.jitter:.1f} ms, "
+            f"last seen {seen.silence:.1f} s ago, {people} performer{'s' * (people != 1)}, "
+            f"{seen.joints} joints"
+        )
+    elif traffic.packets:
+        seen.state = State.UNCLEAR
+        seen.detail = (
+            f"{traffic.packets} packets came, and none held a performer's frame; does the sender "
+            f"speak {urlsplit(seen.address).scheme}?"
+        )
+    else:
+        seen.detail = traffic.trouble or f"nothing came in {seconds:g} s"
+    lost = {"refused": traffic.refused, "dropped": traffic.dropped}
+    seen.detail += "".join(f", {count} {what}" for what, count in lost.items() if count)
+    return seen
+
+
+def listening_ports() -> list[int]:
+    """The UDP ports of this machine that the places in `PLACES` open."""
+    listening = [address for address in PLACES if urlsplit(address).scheme in LISTENS]
+    return [port for address in listening if (port := port_of(address)) is not None]
+
+
+def port_of(address: str) -> int | None:
+    """The port that an address names; None where it names none."""
+    try:
+        return urlsplit(address).port
+    except ValueError:
+        return None
+
+
+def write_json(path: Path, seconds: float, watches: Sequence[Watch]) -> None:
+    """Write what was seen in so many seconds [s].
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    figures = {"seconds": seconds, "devices": [_figures(seen) for seen in watches]}
+    with whole_file(path) as partial:
+        text = json.dumps(figures, indent=2, allow_nan=False)
+        partial.write_text(text + "\n", encoding="utf-8")
+
+
+def _figures(seen: Watch) -> dict[str, Any]:
+    figures: dict[str, Any] = {
+        "address": seen.address,
+        "kind": urlsplit(seen.address).scheme,
+        "state": str(seen.state),
+        "detail": seen.detail,
+    }
+    if seen.owner is not None:
+        figures["owner"] = {"process": seen.owner.process, "name": seen.owner.name}
+    if seen.traffic is not None:
+        figures |= {
+            "performers": sorted(seen.performers),
+            "joints": seen.joints,
+            "rate": seen.traffic.rate / max(len(seen.performers), 1),
+            "jitter_ms": 1e3 * seen.traffic.jitter,
+            "last_seen_s": seen.silence if np.isfinite(seen.silence) else None,
+            "packets": seen.traffic.packets,
+            "frames": seen.traffic.frames,
+            "refused": seen.traffic.refused,
+            "dropped": seen.traffic.dropped,
+        }
+    return figures

@@ -1,0 +1,339 @@
+"""Opening a show: its devices, solvers, window and files, in an order that fails early."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from devices.errors import InputError
+from devices.stream import SkeletonStream
+from replay.playback import playback_of
+from replay.player import Player
+from replay.recorded_stream import RecordedStream
+from replay.recorder import Recorder
+from replay.recording import Recording
+from runtime.characters.character import Character
+from runtime.conditioning.switches import asked_for, for_live, for_recording
+from runtime.control.actions import ShowControls
+from runtime.control.keys import WindowControls
+from runtime.control.remote import PORT, Remote
+from runtime.control.window import Window, leave_windows
+from runtime.driving.drivers import DRIVERS, DriverFactory
+from runtime.driving.mapping import read_mapping
+from runtime.driving.match_session import MatchSession
+from runtime.driving.performer import Performer
+from runtime.driving.puppet_match import Choices
+from runtime.driving.rehearsal import rehearse
+from runtime.output.output import Output
+from runtime.output.report.report import Report
+from runtime.puppet.deformable_surface import Elasticity
+from runtime.puppet.puppet import Puppet
+from runtime.render.camera import front_camera
+from runtime.render.context import headless_context, make_current, release_headless
+from runtime.show.act_group import Act, ActGroup
+from runtime.show.interrupts import interrupts_deferred
+from runtime.show.loop import FrameLoop
+from runtime.show.outputs import check_outputs, open_outputs
+from runtime.show.pacing import TICKS, loses_no_frame
+from runtime.show.provenance import provenance
+from runtime.show.scene import Scene
+from runtime.show.settings import CharacterSettings, ShowSettings
+from runtime.show.takes import Takes, set_aside
+
+if TYPE_CHECKING:
+    import moderngl
+
+STEADY = 1.0  # [s] that a live match is shown before it performs by itself
+
+
+class OpenedShow:
+    """Everything that a `Show` opens; `closing` closes it, in reverse order.
+
+    Args:
+        stream, characters, settings, outputs, context, make_scene, make_driver, clock,
+            warn: as of `Show`.
+        closing: closes what was opened, also where this fails half-way.
+
+    Attributes:
+        loop: performs the frames.
+        scene: draws them, or None where nothing is drawn.
+        make_current: makes the OpenGL context of the scene current on this thread.
+        controls: what actions act upon.
+        window_controls: the window's keys and mouse, or None without a window.
+        remote: the remote control, or None.
+        report: the figures of the show.
+        acts: each performer with their puppets and their match session.
+        puppets: the characters as they are driven.
+    """
+
+    def __init__(
+        self,
+        stream: SkeletonStream,
+        characters: Sequence[Character],
+        settings: ShowSettings,
+        closing: ExitStack,
+        *,
+        outputs: Sequence[Output],
+        context: moderngl.Context | None,
+        make_scene: Callable[..., Scene],
+        make_driver: DriverFactory | None,
+        clock: Callable[[], float],
+        warn: Callable[[str], None],
+    ) -> None:
+        self._settings, self._closing = settings, closing
+        self._clock, self._warn = clock, warn
+        self._source = stream
+        self._stream = closing.enter_context(RecordedStream(stream))
+        _check(characters, settings)
+        self._make_driver = make_driver or _driver(settings.match.driver)
+        self.remote = self._open_remote()
+        usual = for_live() if self._recording is None else for_recording()
+        self._conditioning = asked_for(usual, settings.conditioning)
+        first = self._performer()
+        self.report = Report(settings.files.report)
+        self._parts = [self.report.cast(character) for character in characters]
+        own = settings.characters
+        own = own if len(own) == len(characters) else own * len(characters)
+        self.puppets = list(map(self._puppet, characters, own))
+        self._window = self._open_window()
+        self._shown = self._window is not None or context is not None
+        self.scene = self._open_scene(context, make_scene)
+        self.acts = self._open_acts(first)
+        if self._recording is not None and settings.match.rehearse:
+            self._rehearse(self._recording)
+        with interrupts_deferred():  # files come last, when nothing else can fail
+            self.loop = self._open_loop(outputs)
+            self.controls = self._open_controls()
+        self.window_controls = None
+        if self._window is not None and self.scene is not None:
+            self.window_controls = WindowControls(self._window, self.scene, self.controls)
+        closing.callback(self.make_current)  # for outputs that draw, and for the scene
+
+    def make_current(self) -> None:
+        """Make the OpenGL context current, if there is one; another show may have drawn since."""
+        if self._window is not None:
+            self._window.make_current()
+        elif self._context is not None:
+            leave_windows()
+            make_current(self._context)
+
+    @property
+    def _recording(self) -> Recording | None:
+        playback = playback_of(self._source)
+        return playback.recording if isinstance(playback, Player) else None
+
+    @property
+    def _rate(self) -> float:
+        """About how many frames come in a second."""
+        recording = self._recording
+        if recording is None or recording.seconds == 0.0:
+            return TICKS
+        return (len(recording) - 1) / recording.seconds
+
+    def _performer(self) -> Performer:
+        return Performer(self._stream.skeleton, self._settings.match.source, self._conditioning)
+
+    def _puppet(self, character: Character, own: CharacterSettings) -> Puppet:
+        puppet = Puppet(character, iterations=own.iterations, energy=own.energy)
+        puppet.surface.elasticity = Elasticity(own.cartoon, own.volume_gain, own.stiffness)
+        for note in puppet.surface.notes:
+            self._warn(f"{character.name}: {note}")
+        return puppet
+
+    def _open_remote(self) -> Remote | None:
+        asked = self._settings.remote
+        if asked is None:
+            return None
+        host, port = asked.address
+        remote = Remote(
+            host,
+            PORT if port is None else port,
+            answer_port=asked.feedback_port or 0,
+            tell=self._warn,
+            clock=self._clock,
+        )
+        return self._closing.enter_context(remote)
+
+    def _open_window(self) -> Window | None:
+        if not self._settings.window:
+            return None
+        window = Window("Bunraku", self._settings.size, transparent=self._settings.transparent)
+        return self._closing.enter_context(window)
+
+    def _open_scene(
+        self, context: moderngl.Context | None, make_scene: Callable[..., Scene]
+    ) -> Scene | None:
+        settings = self._settings
+        size = settings.size
+        if self._window is not None:
+            context, size = self._window.context, self._window.size
+        elif context is None and settings.needs_pictures:
+            leave_windows()
+            context = headless_context()
+            self._closing.callback(release_headless, context)
+        self._context = context
+        if context is None:
+            return None
+        self.make_current()
+        scene = make_scene(
+            context,
+            size,
+            self.puppets,
+            self._stream.skeleton,
+            background=settings.background,
+            plain=settings.plain,
+            clock=self._clock,
+        )
+        self._closing.callback(scene.close)
+        self._closing.callback(self.make_current)
+        return scene
+
+    def _open_acts(self, first: Performer) -> list[Act]:
+        """Give each performer one character, and all remaining characters to the last."""
+        count = self._settings.match.performers
+        acts = []
+        for part in range(count):
+            puppets = self.puppets[part : None if part == count - 1 else part + 1]
+            performer = first if part == 0 else self._performer()
+            acts.append(Act(performer, puppets, self._open_match_session(performer, puppets)))
+        return acts
+
+    def _open_match_session(self, performer: Performer, puppets: list[Puppet]) -> MatchSession:
+        match = self._settings.match
+        # Only a window's camera can be walked round the stage. A camera that merely steps back to
+        # have all in view would turn by a rounding error, and the bytes of a cache with it.
+        scene, front = (self.scene if self._window else None), front_camera()
+        patience = match.patience
+        if patience is None:
+            patience = STEADY if self._recording is None else 0.0
+        return MatchSession(
+            performer,
+            puppets,
+            lambda: (front if scene is None else scene.camera).view_rotation,
+            Choices(match.rank, match.extend, match.flip, patience),
+            [
+                None
+                if match.mapping is None
+                else read_mapping(match.mapping, performer.skeleton, puppet.character.skeleton)
+                for puppet in puppets
+            ],
+            make_driver=self._make_driver,
+        )
+
+    def _rehearse(self, recording: Recording) -> None:
+        """Let each act start from the best poses of the recording, and frame all they fill."""
+        source = self._settings.match.source
+        filled = [
+            rehearse(recording, source, act.match_session, self._conditioning, part)
+            for part, act in enumerate(self.acts)
+        ]
+        known = [corners for corners in filled if corners is not None]
+        if self.scene is not None:
+            self.scene.frame_all(np.concatenate(known) if len(known) == len(filled) else None)
+
+    def _open_loop(self, own: Sequence[Output]) -> FrameLoop:
+        self._closing.enter_context(self.report)
+        outputs = open_outputs(
+            self._settings,
+            [
+                (puppet.character, part)
+                for puppet, part in zip(self.puppets, self._parts, strict=True)
+            ],
+            self._stream.skeleton,
+            self._rate,
+            self._closing,
+            warn=self._warn,
+        )
+        outputs[0].extend(self._closing.enter_context(output) for output in own)
+        loop = FrameLoop(
+            self._stream,
+            self.acts[0].performer,
+            self.acts[0].puppets,
+            match_session=self.acts[0].match_session,
+            others=self.acts[1:],
+            report=self.report,
+            scene=self.scene,
+            outputs=outputs,
+            conditioning=self._conditioning,
+            shown=self._shown,
+            clock=self._clock,
+        )
+        self._closing.callback(self._complete_report, loop)
+        return loop
+
+    def _open_controls(self) -> ShowControls:
+        return ShowControls(
+            cues=ActGroup([act.match_session for act in self.acts]),
+            conditioning=self._conditioning,
+            loop=self.loop,
+            surfaces=[puppet.surface for puppet in self.puppets],
+            takes=self._open_takes(),
+            playback=playback_of(self._stream),
+            scene=self.scene,
+        )
+
+    def _open_takes(self) -> Takes:
+        """Takes that may be started, and the recording that the settings ask for, started."""
+        files = self._settings.files
+        recorder = None
+        if files.record is not None:
+            set_aside(files.record, self._warn)
+            recorder = self._open_recorder(files.record)
+            self._closing.callback(self.report.kept, recorder)  # once it is closed
+        takes = Takes(
+            self._stream,
+            files.takes or files.record or Path("take.mcap"),
+            self._open_recorder,
+            tell=self._warn,
+            waits=loses_no_frame(self._source),
+        )
+        self._closing.enter_context(takes)
+        if recorder is not None:
+            takes.record(recorder)
+        return takes
+
+    def _open_recorder(self, path: Path) -> Recorder:
+        origin = self._settings.origin or type(self._source).__name__
+        return Recorder(path, self._stream.skeleton, source=provenance(origin), tell=self._warn)
+
+    def _complete_report(self, loop: FrameLoop) -> None:
+        """Add what is only known at the end."""
+        skeleton, recording = self._stream.skeleton, self._recording
+        if recording is None:
+            frames, seconds = loop.received, loop.seconds
+        else:
+            frames, seconds = len(recording), recording.seconds
+        self.report.recorded(frames=frames, joints=len(skeleton.names), seconds=seconds)
+        mappings = [mapping for act in self.acts for mapping in act.match_session.mappings]
+        for part, mapping in zip(self._parts, mappings, strict=True):
+            part.matched(mapping, skeleton)
+
+
+def _driver(name: str) -> DriverFactory:
+    if name not in DRIVERS:
+        raise InputError(
+            f"MatchSettings.driver: no driver is called {name!r}; there are: {', '.join(DRIVERS)}"
+        )
+    return DRIVERS[name]
+
+
+def _check(characters: Sequence[Character], settings: ShowSettings) -> None:
+    """Refuse settings that do not fit the characters, and files that cannot be written."""
+    count, performers = len(characters), settings.match.performers
+    if count == 0:
+        raise InputError("a show needs at least one character, got none")
+    if performers > count:
+        raise InputError(
+            f"MatchSettings.performers: {performers} performers need as many characters, "
+            f"got {count}"
+        )
+    if len(settings.characters) not in (1, count):
+        raise InputError(
+            f"ShowSettings.characters: expected the settings of all {count} characters or of one "
+            f"for all, got {len(settings.characters)}"
+        )
+    check_outputs(settings, [character.name for character in characters])
