@@ -140,8 +140,13 @@ class PuppetMatch:
         """Let the mapping shown drive the puppet, from this rest state on.
 
         Raises:
-            InputError: the mapping cannot drive this character.
+            InputError: the mapping cannot drive this character, or the driver needs a recording.
         """
+        if self._driver.needs.clip and not self._clip:
+            raise InputError(
+                f"the driver of {self.puppet.character.name} needs the whole motion before its "
+                "first frame: replay a recording, or choose a driver that follows a live stream"
+            )
         if isinstance(self._driver, MappedDriver):
             self._driver.show(self._driver.mapping, view)
         self._driver.prepare(self._clip, rest)
@@ -226,7 +231,13 @@ class PuppetMatch:
     def _make(self, make_driver: DriverFactory) -> Driver:
         puppet = self.puppet
         skeleton = self._performer.skeleton
-        return make_driver(skeleton, puppet.character, puppet.bound_skeleton, puppet.surface)
+        driver = make_driver(skeleton, puppet.character, puppet.bound_skeleton, puppet.surface)
+        if driver.needs.surface:
+            raise InputError(
+                f"the driver of {puppet.character.name} needs a surface of the performer, and this "
+                "source gives joints only: choose a driver that follows a skeleton"
+            )
+        return driver
 
     def _choose(
         self, hysteresis: MatchHysteresis, positions: Array, time: float, view: Array
