@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -64,11 +64,9 @@ class _New:
 
     def raised(self, pose: Pose) -> float:
         """How far [m] the hand is above its rest state."""
-        return (
-            0.0
-            if self.rest is None
-            else pose.seen[self.hand, 1] - self.rest.positions[self.hand, 1]
-        )
+        if self.rest is None:
+            return 0.0
+        return float(pose.seen[self.hand, 1] - self.rest.positions[self.hand, 1])
 
     def reset(self) -> None: ...
 
@@ -105,7 +103,7 @@ class Twister(_New):
 
 
 @pytest.fixture(scope="module")
-def puppet() -> Iterator[Puppet]:
+def puppet() -> Puppet:
     return Puppet(make_figure())
 
 
@@ -131,7 +129,7 @@ def test_a_new_driver_moves_a_character_through_loop_outputs_and_window(
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setitem(DRIVERS, name, {"stretcher": Stretcher, "twister": Twister}[name])  # type: ignore[arg-type]  # the table is read-only for everybody else
+    monkeypatch.setitem(DRIVERS, name, {"stretcher": Stretcher, "twister": Twister}[name])
     player, performer, session = show_of(puppet, DRIVERS[name], record(waving(FRAMES)))
     assert not session.matching, "it performs without a match"
     with ExitStack() as closing:
@@ -176,7 +174,7 @@ def test_a_new_driver_moves_a_character_through_loop_outputs_and_window(
     assert told["stretch"]["p99"] > 0.01
     assert told["match"] == {"score": None, "pairs": []}
     assert np.abs(pictures[FRAMES // 2] - pictures[0]).max() > 60, "it is seen moving"
-    assert len(scene._characters[0].tubes) == (3 if name == "stretcher" else 0)
+    assert len(scene._characters[0].tubes) == (4 if name == "stretcher" else 0)
 
 
 def test_handles_of_its_own_are_met_and_the_whole_travels(puppet: Puppet) -> None:
