@@ -16,8 +16,6 @@ model for elastic deformations, for the energy with rims. Four things are added.
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -25,8 +23,8 @@ from solvers.deform.arap_cells import SPOKES, SPOKES_AND_RIMS, build_cells
 from solvers.deform.arap_kernels import energy_terms, fit_cells, place_outside, pull_soft, residual
 from solvers.deform.arap_layout import (
     Frame,
-    checked_integers,
     checked_mesh,
+    checked_regions,
     checked_targets,
     lay_out,
 )
@@ -35,6 +33,7 @@ from solvers.deform.creases import Creases
 from solvers.deform.handle_influence import HandleInfluence
 from solvers.deform.handle_motion import farthest_motion, follow
 from solvers.deform.handles import checked_handles
+from solvers.deform.rest_pose_trials import RestPoseTrials
 from solvers.deform.rotation_fit import SCRATCH
 from solvers.deform.rotation_priors import (
     SMOOTHNESS,
@@ -50,22 +49,7 @@ from solvers.linear.laplacian import Floats, Ints
 SMOOTH_ROTATIONS = "smooth-rotations"
 ENERGIES = (SPOKES, SPOKES_AND_RIMS, SMOOTH_ROTATIONS)
 
-# A group that turned or went further than this between two frames has jumped: radians, and shares
-# of the character's size.
-_JUMP_ANGLE = math.radians(30.0)
-_JUMP_PATH = 0.1
-
-# Small steps add up: while the handles move, the rest pose is tried every so many frames, between
-# two of them where somebody settles there. A group that turned or went less than this (radians,
-# sizes) stood still.
-_CHECKED = 8
-_STILL = 1e-4
-
 _NO_TURN = np.eye(3).ravel()
-
-# The rest pose must start this much nearer to rigid before it takes the last answer's place: after
-# a jump, and while all goes its way, when nothing should be seen to snap.
-_BETTER, _MUCH_BETTER = 0.9, 0.5
 
 
 class ArapSolver:
@@ -115,7 +99,7 @@ class ArapSolver:
         )
         self._R = np.tile(_NO_TURN, (count, 1))
         self._R_aside = self._R.copy()
-        self._frames_since, self._has_moved, self._is_fresh = 0, False, True
+        self._trials = RestPoseTrials()
         self._laplace_x = np.empty((count, 3))
         self._residual = np.empty((count, 3))
         self._room = np.empty((most_threads(), SCRATCH))
@@ -174,14 +158,7 @@ class ArapSolver:
         Raises:
             ValueError: for wrong shapes or a rigidity out of range; nothing changes then.
         """
-        count = len(self._x)
-        regions = checked_integers(region_of, "regions")
-        shares = np.asarray(rigidity, dtype=np.float64)
-        for name, values in (("regions", regions), ("rigidity", shares)):
-            if values.shape != (count,):
-                raise ValueError(f"expected {name} of shape ({count},), got {values.shape}")
-        if not ((shares >= 0.0) & (shares <= 1.0)).all():
-            raise ValueError("expected a rigidity in [0, 1] at every vertex")
+        regions, shares = checked_regions(region_of, rigidity, len(self._x))
         order = self._layout.order
         self._priors.stiffen(regions[order], shares[order])
 
@@ -200,7 +177,7 @@ class ArapSolver:
         """Forget the last answer: the next solve starts from the rest pose."""
         self._x[:] = self._rest
         self._R[:] = _NO_TURN
-        self._frames_since, self._has_moved, self._is_fresh = 0, False, True
+        self._trials = RestPoseTrials()
         self._goals = self._x[self._handles.places]
 
     def snapshot(self) -> DeformationState:
@@ -212,9 +189,7 @@ class ArapSolver:
             self._goals,
             self._system.precision,
             self._influence.snapshot(),
-            self._frames_since,
-            self._has_moved,
-            self._is_fresh,
+            self._trials,
             None if self._creases is None else self._creases.snapshot(),
         )
 
@@ -238,8 +213,7 @@ class ArapSolver:
         self._influence.restore(state.influence)
         self._x[:], self._R[:], self._goals = state.positions, state.rotations, state.goals
         self._shown = self._x
-        self._frames_since, self._has_moved = state.frames_since, state.has_moved
-        self._is_fresh = state.is_fresh
+        self._trials = state.trials
         if state.creases is None:
             self._creases = None
         else:
@@ -280,8 +254,9 @@ class ArapSolver:
         and then have to do first, trying the rest pose, is done here.
         """
         with threads_for(len(self._x)):
-            if self._has_moved and self._frames_since >= _CHECKED:
-                self._try_from_rest(self._goals, _MUCH_BETTER)
+            share = self._trials.share_between_frames()
+            if share is not None:
+                self._try_from_rest(self._goals, share)
             for _ in range(iterations):
                 self._local_step(self._x)
                 self._global_step()
@@ -354,18 +329,16 @@ class ArapSolver:
             turn_along(self._R, influence.influences, step)
         self._goals = goals
         self._put_held(goals, self._x)
-        self._frames_since += 1
-        self._has_moved |= angle > _STILL or path > _STILL
-        if angle > _JUMP_ANGLE or path > _JUMP_PATH:
-            self._try_from_rest(goals, _BETTER)
-        elif self._has_moved and self._frames_since > _CHECKED:
-            self._try_from_rest(goals, _MUCH_BETTER)
-        self._is_fresh = False
+        self._trials = self._trials.after_step(angle, path)
+        share = self._trials.share_after_step(angle, path)
+        if share is not None:
+            self._try_from_rest(goals, share)
+        self._trials = self._trials.after_solve()
 
     def _try_from_rest(self, goals: Floats, share: float) -> None:
         """Start from the rest pose, moved along, if its energy is under a share of that of x."""
-        self._frames_since, self._has_moved = 0, False
-        if self._is_fresh:  # x is that already
+        self._trials = self._trials.after_trial()
+        if self._trials.is_fresh:  # x is that already
             return
         influence, ties = self._influence, self._priors.is_on
         whole = influence.motions(self._rest[self._handles.places], goals)
@@ -399,13 +372,7 @@ class ArapSolver:
         return float(self._energy_terms.sum())
 
     def _held(self) -> Hold:
-        handles = self._handles
-        fixed = np.zeros(len(self._rest), dtype=np.bool_)
-        fixed[self._carried.places] = True
-        fixed[handles.places[handles.hard]] = True
-        stiffness = np.zeros(len(self._rest))
-        stiffness[handles.places] = np.where(handles.hard, 0.0, handles.weights) * self._unit
-        return Hold(fixed, stiffness)
+        return self._carried.hold(self._handles, len(self._rest), self._unit)
 
 
 def _area(points: Floats, faces: Ints) -> float:

@@ -28,8 +28,9 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from solvers.retarget.abstraction import SimplifiedSource, SubTree, abstract, simplify
+from solvers.retarget.abstraction import SubTree, abstract
 from solvers.retarget.assignment import MOST_COLUMNS, rank_assignments
+from solvers.retarget.source_limbs import SimplifiedSource, simplify
 from solvers.skeleton.tree import Tree, extend_to_leaf
 
 __all__ = ["Match", "TargetHierarchy", "Tree", "extend_to_leaf", "rank_matches"]

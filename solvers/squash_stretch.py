@@ -30,28 +30,26 @@ from numpy.typing import ArrayLike
 
 from solvers.arap import ArapSolver
 from solvers.deform.arap_cells import SPOKES
+from solvers.deform.cell_planes import cell_planes, vertex_normals
 from solvers.deform.closed_shells import build_shell
 from solvers.deform.solver_state import DeformationState
 from solvers.deform.squash_kernels import (
     Fit,
-    Planes,
-    add_scaled,
-    find_pressures,
     fit_pose_cells,
     fit_scaled_cells,
     pose_cells,
-    push,
     rest_covariances,
     scale_cells,
+)
+from solvers.deform.volume_kernels import (
+    add_scaled,
+    find_pressures,
+    push,
     strain_cells,
     sum_parts,
     volume_terms,
 )
-from solvers.linear.laplacian import Floats, Ints, weighted_sums
-
-# The least extent of a cell along its second axis, as a share of the first: a ring that is nearly a
-# line has no stretch across it to speak of.
-_THIN = 1e-3
+from solvers.linear.laplacian import Floats
 
 _LARGEST_GAIN = 10.0
 
@@ -92,7 +90,9 @@ class SquashStretchSolver(ArapSolver):
         self._VR = np.empty((count, 9))
         rest = Fit(self._VR, self._scales, self._laplace_x, self._room)
         rest_covariances(self._rest, self._mesh.cells, rest)
-        self._planes = _planes(self._VR.reshape(-1, 3, 3), _normals(self._rest, self._layout.faces))
+        self._planes = cell_planes(
+            self._VR.reshape(-1, 3, 3), vertex_normals(self._rest, self._layout.faces)
+        )
         self._shell = build_shell(self._rest, self._layout.faces, self._layout.parts)
         parts = int(self._layout.parts.max()) + 1
         self._strains = np.zeros(count)
@@ -257,57 +257,3 @@ class SquashStretchSolver(ArapSolver):
         part_of_face = self._layout.parts[self._shell.faces[:, 0]]
         areas = np.bincount(part_of_face, self._shell.areas, minlength=len(self._sums))
         return np.column_stack([self._sums[:, 0], areas])
-
-
-def _normals(vertices: Floats, faces: Ints) -> Floats:
-    """The sum of the area vectors around each vertex (N, 3), over the sum of the areas."""
-    a, b, c = (vertices[faces[:, corner]] for corner in range(3))
-    vectors = np.cross(b - a, c - a)
-    areas = np.linalg.norm(vectors, axis=1)
-    around = np.column_stack([vectors, areas]).T
-    corners = faces.T.ravel()
-    sums = np.stack([weighted_sums(corners, np.tile(s, 3), len(vertices)) for s in around], axis=1)
-    return sums[:, :3] / np.maximum(sums[:, 3:], 1e-300)
-
-
-def _least_axis(C: Floats, strength: Floats, normals: Floats) -> Floats:
-    """The normal of each plane (N, 3): that given, or C's least axis where it is none."""
-    pulled = C - strength[:, None, None] * normals[:, :, None] * normals[:, None, :]
-    _, vectors = np.linalg.eigh(pulled)
-    least: Floats = vectors[:, :, 0]
-    return least
-
-
-def _axes_across(normals: Floats, C: Floats) -> tuple[Floats, Floats]:
-    """The axes (N, 2, 3) of C in the planes of these normals, greater extent first, and extents."""
-    every = np.arange(len(normals))
-    flattest = np.abs(normals).argmin(axis=1)
-    u = -normals * normals[every, flattest, None]
-    u[every, flattest] += 1.0
-    u /= np.linalg.norm(u, axis=1, keepdims=True)
-    v = np.cross(normals, u)
-    Cu, Cv = np.einsum("nij,nj->ni", C, u), np.einsum("nij,nj->ni", C, v)
-    uu, uv, vv = (np.einsum("ni,ni->n", a, b) for a, b in ((u, Cu), (u, Cv), (v, Cv)))
-    turn = 0.5 * np.arctan2(2.0 * uv, uu - vv)[:, None]
-    axes = np.stack([np.cos(turn) * u + np.sin(turn) * v, np.cos(turn) * v - np.sin(turn) * u], 1)
-    mean, half = 0.5 * (uu + vv), np.hypot(0.5 * (uu - vv), uv)
-    return axes, np.maximum(np.stack([mean + half, mean - half], axis=1), 0.0)
-
-
-def _planes(C: Floats, normals: Floats) -> Planes:
-    """What the two states need to know of the cells, from their covariances at rest (N, 3, 3).
-
-    A cell's plane is that of its normal, which on the edge of a box is well defined while the
-    second axis of its covariance is not; where faces have no common side, that of its covariance.
-    """
-    extents = np.trace(C, axis1=1, axis2=2)
-    normals = _least_axis(C, 10.0 * extents, normals)
-    axes, pair = _axes_across(normals, C)
-    damped = pair**2 + (_THIN * pair.max(axis=1, keepdims=True)) ** 2
-    weights = np.sqrt(np.divide(pair, damped, out=np.zeros_like(pair), where=damped > 0.0))
-    inverse = np.divide(1.0, extents, out=np.zeros_like(extents), where=extents > 1e-200)
-    return Planes(
-        extents=np.column_stack([extents, inverse]),
-        axes=axes.reshape(-1, 6),
-        shares=np.concatenate([weights, 1.0 - weights**2 * pair], axis=1),
-    )

@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.matching import SIZE_PREFERENCE, Match, TargetHierarchy
-from solvers.retarget.abstraction import simplify
 from solvers.retarget.chain_retargets import ChainRetargets
 from solvers.retarget.polyline_motion import map_chain
+from solvers.retarget.source_limbs import simplify
 from solvers.skeleton.forward_kinematics import SkeletonPose
 from solvers.skeleton.tree import Tree
 

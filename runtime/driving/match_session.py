@@ -19,8 +19,8 @@ from runtime.driving.performer import Performer, Pose, Rest, rest_state
 from runtime.driving.polyline_driver import PolylineDriver
 from runtime.driving.puppet_match import Choices, PuppetMatch, PuppetMatchState
 from runtime.puppet.puppet import Puppet
-from solvers.retarget.abstraction import simplify
 from solvers.retarget.posture import most_different
+from solvers.retarget.source_limbs import simplify
 
 LEAST_SEEN = 0.5  # share of the driving joints that must be in view to strike a pose
 CHOICES = 32  # poses of a rehearsal, evenly spaced, that the rest state is chosen from

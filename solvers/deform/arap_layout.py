@@ -73,6 +73,18 @@ def checked_mesh(vertices: ArrayLike, faces: ArrayLike) -> tuple[Floats, Ints]:
     return points, triangles
 
 
+def checked_regions(region_of: ArrayLike, rigidity: ArrayLike, count: int) -> tuple[Ints, Floats]:
+    """Regions (N,) and rigidities (N,) in [0, 1], or a ValueError that says what is wrong."""
+    regions = checked_integers(region_of, "regions")
+    shares = np.asarray(rigidity, dtype=np.float64)
+    for name, values in (("regions", regions), ("rigidity", shares)):
+        if values.shape != (count,):
+            raise ValueError(f"expected {name} of shape ({count},), got {values.shape}")
+    if not ((shares >= 0.0) & (shares <= 1.0)).all():
+        raise ValueError("expected a rigidity in [0, 1] at every vertex")
+    return regions, shares
+
+
 def checked_targets(targets: ArrayLike, count: int, frame: Frame) -> Floats:
     """Targets (H, 3), or a ValueError that says what is wrong with them."""
     points = np.asarray(targets, dtype=np.float64)

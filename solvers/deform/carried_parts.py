@@ -9,6 +9,7 @@ import numpy as np
 from solvers.deform.arap_layout import Layout
 from solvers.deform.handle_motion import Influences, fit_motions, follow, follow_one_group
 from solvers.deform.handles import Handles, nearest_groups, unheld
+from solvers.linear.constrained_system import Hold
 from solvers.linear.laplacian import Floats, Ints
 
 
@@ -29,6 +30,18 @@ class CarriedParts:
         """Find them on a surface with rest positions (N, 3)."""
         places = unheld(handles, layout)
         return cls(places, follow_one_group(nearest_groups(rest, places, handles, layout.parts)))
+
+    def hold(self, handles: Handles, count: int, unit: float) -> Hold:
+        """Return how handles and carried parts hold `count` vertices.
+
+        A soft handle of weight 1 is a spring of stiffness `unit`.
+        """
+        fixed = np.zeros(count, dtype=np.bool_)
+        fixed[self.places] = True
+        fixed[handles.places[handles.hard]] = True
+        stiffness = np.zeros(count)
+        stiffness[handles.places] = np.where(handles.hard, 0.0, handles.weights) * unit
+        return Hold(fixed, stiffness)
 
     def move(self, rest: Floats, handles: Handles, goals: Floats, x: Floats) -> None:
         """Put them into x (N, 3), moved rigidly from rest as the handles are to `goals` (H, 3)."""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from solvers.deform.squash_kernels import Shell
+from solvers.deform.volume_kernels import Shell
 from solvers.linear.laplacian import Floats, Ints
 
 _CHUNK = 512  # faces that are summed in one go

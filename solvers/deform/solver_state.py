@@ -10,6 +10,7 @@ import numpy as np
 from solvers.deform.creases import CreasesState
 from solvers.deform.handle_influence import HandleInfluenceState
 from solvers.deform.handles import Handles
+from solvers.deform.rest_pose_trials import RestPoseTrials
 from solvers.linear.laplacian import Floats
 
 
@@ -28,9 +29,7 @@ class DeformationState:
         goals: (H, 3) their targets in the last solve.
         precision: the type of the factor's numbers; it depends on earlier handles.
         influence: which groups the vertices follow, and how far the search for them had come.
-        frames_since: the frames since the rest pose was last tried.
-        has_moved: whether a handle has moved since then.
-        is_fresh: whether no solve has come since the rest pose.
+        trials: when the rest pose is tried next.
         creases: the folded triangles; None before the first were looked for.
         cell_scales: (N,) the scales in `rotations`; None where the cells do not scale.
     """
@@ -41,8 +40,6 @@ class DeformationState:
     goals: Floats
     precision: np.dtype[Any]
     influence: HandleInfluenceState
-    frames_since: int
-    has_moved: bool
-    is_fresh: bool
+    trials: RestPoseTrials
     creases: CreasesState | None
     cell_scales: Floats | None = None

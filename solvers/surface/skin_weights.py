@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 from scipy.spatial.distance import cdist
 from scipy.spatial.transform import Rotation
 
-from devices.skeleton import Skeleton
+from solvers.skeleton.tree import Tree
 
 INFLUENCES = 4  # nodes a vertex may follow, as game engines have it
 _CANDIDATES = 8  # nodes among which those are chosen
@@ -74,15 +74,15 @@ def skin_of_weights(weights: csr_array) -> Skin:
     return Skin(nodes, kept / kept.sum(axis=1, keepdims=True))
 
 
-def skin_of_distances(vertices: NDArray[np.float64], skeleton: Skeleton) -> Skin:
+def skin_of_distances(vertices: NDArray[np.float64], tree: Tree) -> Skin:
     """Weights that fall with the fourth power of the distance to the nodes.
 
     Only nodes near the nearest one along the tree compete, so that a limb does not follow another
     that happens to hang beside it.
     """
-    rest = skeleton.rest_positions
+    rest = tree.positions
     count = min(_CANDIDATES, len(rest))
-    steps = _steps_between(skeleton)
+    steps = _steps_between(tree)
     extent = float(np.ptp(np.concatenate([vertices, rest]), axis=0).max())
     nearest = KDTree(rest).query(vertices)[1]
     nodes = np.zeros((len(vertices), count), np.int64)
@@ -97,9 +97,7 @@ def skin_of_distances(vertices: NDArray[np.float64], skeleton: Skeleton) -> Skin
     return Skin(nodes, weights / weights.sum(axis=1, keepdims=True))
 
 
-def fit_skin(
-    vertices: NDArray[np.float64], skeleton: Skeleton, prior: Skin, samples: PosedSamples
-) -> Skin:
+def fit_skin(vertices: NDArray[np.float64], tree: Tree, prior: Skin, samples: PosedSamples) -> Skin:
     """The skin with at most `INFLUENCES` nodes a vertex that reproduces the samples best.
 
     For each vertex, weights w >= 0 that sum to 1 minimise the squared distance between the
@@ -110,7 +108,7 @@ def fit_skin(
 
     Args:
         vertices: (N, 3) rest positions.
-        skeleton: the nodes and where they rest.
+        tree: the nodes at rest.
         prior: candidates, and weights to fall back on.
         samples: what to reproduce.
     """
@@ -118,56 +116,56 @@ def fit_skin(
         return prior.strongest(INFLUENCES)
     extent = float(np.ptp(vertices, axis=0).max())
     pull = len(samples.vertices) * (_PRIOR * extent) ** 2
-    wide = _minimise(_moments(vertices, skeleton, prior, samples), prior.weights, pull)
+    wide = _minimise(_moments(vertices, tree, prior, samples), prior.weights, pull)
     narrow = Skin(prior.nodes, wide).strongest(INFLUENCES)
-    moments = _moments(vertices, skeleton, narrow, samples)
+    moments = _moments(vertices, tree, narrow, samples)
     return Skin(narrow.nodes, _minimise(moments, narrow.weights, pull))
 
 
 def deviations(
-    vertices: NDArray[np.float64], skeleton: Skeleton, skin: Skin, samples: PosedSamples
+    vertices: NDArray[np.float64], tree: Tree, skin: Skin, samples: PosedSamples
 ) -> NDArray[np.float64]:
     """Distances (S, N) [m] between the skinned surface and the performed one."""
     found = np.zeros(samples.vertices.shape[:2])
     for sample in range(len(found)):
-        offsets = _offsets(vertices, skeleton, skin, samples, sample)  # (N, C, 3)
+        offsets = _offsets(vertices, tree, skin, samples, sample)  # (N, C, 3)
         found[sample] = np.linalg.norm(np.einsum("nc,nci->ni", skin.weights, offsets), axis=1)
     return found
 
 
-def _steps_between(skeleton: Skeleton) -> NDArray[np.float64]:
+def _steps_between(tree: Tree) -> NDArray[np.float64]:
     """How many bones lie between any two nodes (K, K)."""
-    count = len(skeleton.parents)
-    children = np.flatnonzero(skeleton.parents >= 0)
+    count = len(tree.parents)
+    children = np.flatnonzero(tree.parents >= 0)
     ones = np.ones(len(children))
-    tree = csr_array((ones, (children, skeleton.parents[children])), shape=(count, count))
-    steps: NDArray[np.float64] = shortest_path(tree, directed=False, unweighted=True)
+    bones = csr_array((ones, (children, tree.parents[children])), shape=(count, count))
+    steps: NDArray[np.float64] = shortest_path(bones, directed=False, unweighted=True)
     return steps
 
 
 def _offsets(
     vertices: NDArray[np.float64],
-    skeleton: Skeleton,
+    tree: Tree,
     skin: Skin,
     samples: PosedSamples,
     sample: int,
 ) -> NDArray[np.float64]:
     """Where each of its nodes would take each vertex, from where it is: (N, C, 3)."""
     turns = Rotation.from_quat(samples.rotations[sample]).as_matrix()  # (K, 3, 3)
-    shifts = samples.positions[sample] - np.einsum("kij,kj->ki", turns, skeleton.rest_positions)
+    shifts = samples.positions[sample] - np.einsum("kij,kj->ki", turns, tree.positions)
     carried = np.einsum("ncij,nj->nci", turns[skin.nodes], vertices) + shifts[skin.nodes]
     offsets: NDArray[np.float64] = carried - samples.vertices[sample][:, None, :]
     return offsets
 
 
 def _moments(
-    vertices: NDArray[np.float64], skeleton: Skeleton, skin: Skin, samples: PosedSamples
+    vertices: NDArray[np.float64], tree: Tree, skin: Skin, samples: PosedSamples
 ) -> NDArray[np.float64]:
     """The quadratic forms (N, C, C) that give the squared error of weights over all samples."""
     width = skin.nodes.shape[1]
     moments = np.zeros((len(vertices), width, width))
     for sample in range(len(samples.vertices)):
-        offsets = _offsets(vertices, skeleton, skin, samples, sample)
+        offsets = _offsets(vertices, tree, skin, samples, sample)
         moments += offsets @ offsets.transpose(0, 2, 1)
     return moments
 

@@ -12,50 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from solvers.arap import ArapSolver
 from solvers.linear.laplacian import graph_laplacian, half_cotangents, sum_over_faces
+from tests.solvers.bars import bar, bent, ends, stretch
 
 ENERGIES = ["spokes", "spokes-and-rims"]
-
-
-def bar(rings: int = 40, around: int = 16) -> tuple[np.ndarray, np.ndarray]:
-    """A closed round bar along x, of length 4 and radius 0.5, Delaunay everywhere."""
-    x = np.linspace(0.0, 4.0, rings)
-    angle = 2 * np.pi * (np.arange(around) + 0.5 * (np.arange(rings)[:, None] % 2)) / around
-    tube = np.stack(
-        [np.broadcast_to(x[:, None], angle.shape), 0.5 * np.cos(angle), 0.5 * np.sin(angle)], -1
-    ).reshape(-1, 3)
-    i, k = np.meshgrid(np.arange(rings - 1), np.arange(around), indexing="ij")
-    i, k = i.ravel(), k.ravel()
-    a, b = i * around + k, i * around + (k + 1) % around
-    c, d = a + around, b + around
-    odd = (i % 2 == 1)[:, None]
-    first = np.where(odd, np.stack([a, b, d], 1), np.stack([a, b, c], 1))
-    second = np.where(odd, np.stack([a, d, c], 1), np.stack([b, d, c], 1))
-    last = len(tube)
-    k = np.arange(around)
-    start = np.stack([np.full(around, last), (k + 1) % around, k], 1)
-    end = np.stack([np.full(around, last + 1), k, (k + 1) % around], 1)
-    end[:, 1:] += last - around
-    return np.vstack([tube, [-0.1, 0, 0], [4.1, 0, 0]]), np.concatenate([first, second, start, end])
-
-
-def ends(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Handles at both ends of the bar, and their groups."""
-    handles = np.flatnonzero((vertices[:, 0] < 0.25) | (vertices[:, 0] > 3.75))
-    return handles, (vertices[handles, 0] > 2.0).astype(int)
-
-
-def bent(vertices: np.ndarray, handles: np.ndarray, groups: np.ndarray, angle: float) -> np.ndarray:
-    targets = vertices[handles].copy()
-    turn = Rotation.from_rotvec([0.0, 0.2 * angle, angle])
-    middle = np.array([2.0, 0.0, 0.0])
-    targets[groups == 1] = turn.apply(targets[groups == 1] - middle) + middle
-    return targets
-
-
-def stretch(vertices: np.ndarray, faces: np.ndarray, answer: np.ndarray) -> np.ndarray:
-    a, b = faces[:, [0, 1, 2]].ravel(), faces[:, [1, 2, 0]].ravel()
-    rest = np.linalg.norm(vertices[a] - vertices[b], axis=1)
-    return abs(np.linalg.norm(answer[a] - answer[b], axis=1) / rest - 1.0)
 
 
 @pytest.mark.parametrize("energy", ENERGIES)
@@ -400,47 +359,3 @@ def test_an_arm_bends_over_many_frames_without_tearing():
     for angle in np.linspace(0.0, 1.5, 16):
         answer = solver.solve(bent(vertices, handles, groups, angle), 3)
     assert np.percentile(stretch(vertices, faces, answer), 99) < 0.5
-
-
-GOOD = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
-
-
-@pytest.mark.parametrize(
-    ("arguments", "options", "message"),
-    [
-        ((np.zeros((3, 2)), [[0, 1, 2]], [0]), {}, r"vertices of shape \(N, 3\).*\(3, 2\)"),
-        ((np.zeros((0, 3)), np.zeros((0, 3), int), [0]), {}, r"vertices of shape"),
-        ((np.full((3, 3), np.nan), [[0, 1, 2]], [0]), {}, "vertex 0 is not finite"),
-        ((GOOD, [[0, 1, 3]], [0]), {}, "faces name vertex 3, but there are 3"),
-        ((GOOD, [[0, 1, -1]], [0]), {}, "faces name vertex -1"),
-        ((GOOD, [[0, 1, 2, 0]], [0]), {}, r"faces of shape \(F, 3\)"),
-        ((GOOD, [[0.0, 1.0, 2.0]], [0]), {}, "integer faces"),
-        ((GOOD, [[0, 1, 2]], []), {}, r"handles of shape \(H,\), H > 0"),
-        ((GOOD, [[0, 1, 2]], [3]), {}, "handles name vertex 3"),
-        ((GOOD, [[0, 1, 2]], [1, 2, 1]), {}, "vertex 1 is a handle more than once"),
-        ((GOOD, [[0, 1, 2]], [1]), {"energy": "rims"}, "unknown energy 'rims'.*spokes-and-rims"),
-        ((GOOD, [[0, 1, 2]], [1, 2]), {"groups": [1]}, r"groups of shape \(2,\), got \(1,\)"),
-    ],
-)
-def test_bad_input_is_named(arguments: tuple, options: dict, message: str):
-    with pytest.raises(ValueError, match=message):
-        ArapSolver(*arguments, **options)
-
-
-@pytest.mark.parametrize(
-    ("targets", "message"),
-    [
-        (np.zeros((2, 3)), r"targets of shape \(1, 3\), got \(2, 3\)"),
-        ([[np.nan, 0, 0]], "target 0 is not finite"),
-        ([[np.inf, 0, 0]], "target 0 is not finite"),
-        ([[1e30, 0, 0]], "target 0 .*absurdly far"),
-    ],
-)
-def test_bad_targets_are_named_and_change_nothing(targets: object, message: str):
-    solver = ArapSolver(GOOD, [[0, 1, 2]], [1])
-    before = solver.solve([[1.0, 1.0, 0.0]])
-    with pytest.raises(ValueError, match=message):
-        solver.solve(targets)
-    np.testing.assert_allclose(solver.solve([[1.0, 1.0, 0.0]]), before, atol=1e-12)
-    with pytest.raises(ValueError, match="iterations"):
-        solver.solve([[1.0, 1.0, 0.0]], -1)

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from solvers.matching import TargetHierarchy, rank_matches
-from solvers.retarget.abstraction import abstract, simplify
+from solvers.retarget.abstraction import abstract
+from solvers.retarget.source_limbs import simplify
 from solvers.skeleton.forward_kinematics import SkeletonPose
 from solvers.skeleton.tree import Tree, extend_to_leaf
 

@@ -104,7 +104,7 @@ class GltfExport:
         builder.save(self._path)
 
     def _fitted_skin(self) -> Skin:
-        vertices, skeleton = self._character.vertices, self._character.skeleton
+        vertices, tree = self._character.vertices, self._character.skeleton.tree
         frames = self._samples
         nodes = [frame.nodes_for("a skinned .glb") for frame in frames]
         samples = PosedSamples(
@@ -115,9 +115,9 @@ class GltfExport:
         if self._character.weights is not None:
             skin = skin_of_weights(self._character.weights)
         else:
-            skin = fit_skin(vertices, skeleton, skin_of_distances(vertices, skeleton), samples)
+            skin = fit_skin(vertices, tree, skin_of_distances(vertices, tree), samples)
         if frames:
-            off = deviations(vertices, skeleton, skin, samples)
+            off = deviations(vertices, tree, skin, samples)
             self.deviation = SkinDeviation(float(np.sqrt(np.mean(off**2))), float(off.max()))
         return skin
 

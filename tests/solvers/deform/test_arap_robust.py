@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from solvers.arap import ENERGIES, ArapSolver
 from solvers.squash_stretch import SquashStretchSolver
-from tests.solvers.test_arap import bar, bent, ends, stretch
+from tests.solvers.bars import bar, bent, ends, stretch
 
 Targets = Iterator[np.ndarray]
 

@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from solvers.arap import ArapSolver
 from solvers.deform.arap_cells import SPOKES, SPOKES_AND_RIMS, build_cells
 from solvers.deform.rotation_priors import HALF, RotationPriors
-from tests.solvers.test_arap import bar, bent, ends
+from tests.solvers.bars import bar, bent, ends
 
 
 def limbs_of(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from solvers.deform.stiff_segments import Articulation, articulate
-from tests.solvers.test_arap import bar
+from tests.solvers.bars import bar
 
 
 def along_x(*x: float, bend: tuple[float, float] | None = None) -> np.ndarray:

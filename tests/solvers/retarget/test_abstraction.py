@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from solvers.retarget.abstraction import abstract, find_root, simplify
+from solvers.retarget.abstraction import abstract, find_root
+from solvers.retarget.source_limbs import simplify
 from solvers.skeleton.tree import Tree
 
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from solvers.matching import Match, TargetHierarchy
-from solvers.retarget.abstraction import simplify
 from solvers.retarget.match_hysteresis import MatchHysteresis
+from solvers.retarget.source_limbs import simplify
 from solvers.skeleton.tree import Tree
 
 

@@ -14,7 +14,8 @@ from scipy.spatial.transform import Rotation
 
 from runtime.characters.formats.mesh_file import read_mesh_file
 from solvers.retarget.abstraction import abstract
-from solvers.skeleton.skeletonize import MOST_NODES, extract_skeleton
+from solvers.skeleton.curve_tree import MOST_NODES
+from solvers.skeleton.skeletonize import extract_skeleton
 from solvers.skeleton.tree import Tree
 from solvers.surface.voxel_solid import surface_samples, voxel_solid
 

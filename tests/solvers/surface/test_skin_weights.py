@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 from scipy.spatial.transform import Rotation
 
-from devices.skeleton import Skeleton
+from solvers.skeleton.tree import Tree
 from solvers.surface.skin_weights import (
     PosedSamples,
     Skin,
@@ -17,21 +17,19 @@ from solvers.surface.skin_weights import (
 )
 
 
-def make_chain(count: int) -> Skeleton:
+def make_chain(count: int) -> Tree:
     rest = np.linspace([0, 0, 0], [0, 1, 0], count)
-    return Skeleton(tuple(f"n{k}" for k in range(count)), np.arange(count) - 1, rest)
+    return Tree(np.arange(count) - 1, rest)
 
 
-def skinned(
-    vertices: NDArray[np.float64], skeleton: Skeleton, skin: Skin, frames: int
-) -> PosedSamples:
+def skinned(vertices: NDArray[np.float64], tree: Tree, skin: Skin, frames: int) -> PosedSamples:
     """What a skin makes of random motions of the nodes."""
     random = np.random.default_rng(7)
-    count = len(skeleton.names)
-    positions = skeleton.rest_positions + random.normal(0, 0.2, (frames, count, 3))
+    count = len(tree)
+    positions = tree.positions + random.normal(0, 0.2, (frames, count, 3))
     turns = Rotation.random(frames * count, rng=random)
     matrices = turns.as_matrix().reshape(frames, count, 3, 3)
-    offsets = vertices[:, None] - skeleton.rest_positions[None]  # (N, K, 3)
+    offsets = vertices[:, None] - tree.positions[None]  # (N, K, 3)
     carried = np.einsum("skij,nkj->snki", matrices, offsets) + positions[:, None]
     dense = np.zeros((len(vertices), count))
     np.add.at(dense, (np.arange(len(vertices))[:, None], skin.nodes), skin.weights)
@@ -41,13 +39,13 @@ def skinned(
 
 def test_the_weights_that_made_a_performance_are_found_again() -> None:
     random = np.random.default_rng(1)
-    skeleton = make_chain(8)
+    tree = make_chain(8)
     vertices = random.uniform([-0.1, 0, -0.1], [0.1, 1, 0.1], (60, 3))
     nodes = np.array([random.permutation(8)[:3] for _ in vertices])
     truth = Skin(nodes, random.dirichlet(np.ones(3), len(vertices)))
-    samples = skinned(vertices, skeleton, truth, frames=20)
-    prior = skin_of_distances(vertices, skeleton)
-    found = fit_skin(vertices, skeleton, prior, samples)
+    samples = skinned(vertices, tree, truth, frames=20)
+    prior = skin_of_distances(vertices, tree)
+    found = fit_skin(vertices, tree, prior, samples)
     assert found.nodes.shape == (60, 4)
     np.testing.assert_allclose(found.weights.sum(axis=1), 1.0, atol=1e-12)
     assert found.weights.min() >= 0
@@ -55,20 +53,20 @@ def test_the_weights_that_made_a_performance_are_found_again() -> None:
     for table, skin in zip(dense, (truth, found), strict=True):
         np.add.at(table, (np.arange(60)[:, None], skin.nodes), skin.weights)
     np.testing.assert_allclose(dense[1], dense[0], atol=0.01)
-    assert deviations(vertices, skeleton, found, samples).max() < 0.01
+    assert deviations(vertices, tree, found, samples).max() < 0.01
 
 
 def test_where_all_nodes_move_alike_the_prior_stands() -> None:
     random = np.random.default_rng(1)
-    skeleton = make_chain(3)
+    tree = make_chain(3)
     vertices = random.uniform([-0.1, 0, -0.1], [0.1, 1, 0.1], (20, 3))
-    prior = skin_of_distances(vertices, skeleton)
+    prior = skin_of_distances(vertices, tree)
     turn = Rotation.from_rotvec([0.4, 1, 0])
-    rest = np.array(skeleton.rest_positions)
+    rest = np.array(tree.positions)
     samples = PosedSamples(
         turn.apply(vertices)[None], turn.apply(rest)[None], np.tile(turn.as_quat(), (1, 3, 1))
     )
-    found = fit_skin(vertices, skeleton, prior, samples)
+    found = fit_skin(vertices, tree, prior, samples)
     np.testing.assert_allclose(found.weights, prior.weights, atol=1e-9)
 
 
@@ -79,10 +77,9 @@ def test_limbs_that_hang_side_by_side_do_not_follow_each_other() -> None:
         for step in range(1, 8):
             parents.append(0 if step == 1 else len(parents) - 1)
             rest.append([x, 1 - 0.1 * step, 0])
-    names = tuple(f"n{k}" for k in range(len(rest)))
-    skeleton = Skeleton(names, np.array(parents), np.array(rest))
+    tree = Tree(np.array(parents), np.array(rest))
     left_tip = np.array([[-0.004, 0.32, 0.0]])
-    skin = skin_of_distances(left_tip, skeleton)
+    skin = skin_of_distances(left_tip, tree)
     right = skin.nodes[0] >= 8
     assert skin.weights[0][right].sum() < 0.01
     assert skin.nodes[0][0] == 7
@@ -102,9 +99,9 @@ def test_the_strongest_weights_of_a_file_are_kept_and_sum_to_one() -> None:
 @pytest.mark.parametrize("nodes", [1, 2, 5])
 def test_few_nodes_and_no_samples_are_no_trouble(nodes: int) -> None:
     rest = np.linspace([0, 0, 0], [0, 1, 0], nodes)
-    skeleton = Skeleton(tuple(f"n{k}" for k in range(nodes)), np.arange(nodes) - 1, rest)
-    prior = skin_of_distances(np.array(rest), skeleton)  # vertices right on the nodes
+    tree = Tree(np.arange(nodes) - 1, rest)
+    prior = skin_of_distances(np.array(rest), tree)  # vertices right on the nodes
     none = PosedSamples(np.zeros((0, nodes, 3)), np.zeros((0, nodes, 3)), np.zeros((0, nodes, 4)))
-    skin = fit_skin(np.array(rest), skeleton, prior, none)
+    skin = fit_skin(np.array(rest), tree, prior, none)
     np.testing.assert_array_equal(skin.nodes[:, 0], np.arange(nodes))
     np.testing.assert_allclose(skin.weights[:, 0], 1.0, atol=1e-9)

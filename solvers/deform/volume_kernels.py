@@ -1,0 +1,176 @@
+"""Compiled kernels that measure the volume of closed surfaces and find the pressure to restore it.
+
+Positions x are (N, 3), in the solver's order.
+
+Source: Celikcan, Yaz and Capin 2015, section 4; see `solvers.squash_stretch` for the pressure.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numba import prange
+from numpy.typing import NDArray
+
+from solvers.kernels.compiled import kernel, parallel_kernel
+from solvers.linear.laplacian import Floats
+
+# The most that a pressure may mend, in mean strains of the component times its volume. What no
+# squash explains (a bend loses volume too) is then not pumped into the little that is squashed.
+_MOST = 3.0
+
+_TINY = 1e-300
+
+
+class Shell(NamedTuple):
+    """The closed surfaces whose volumes are kept; a named tuple, because kernels take one as it is.
+
+    Faces (F, 3) lie component by component, with fans over holes, which have no area; chunk c is
+    the faces from `chunks[c]` to `chunks[c + 1]`, all of the component `parts[c]`, whose volume is
+    taken from its vertex `origins[c]`. Around vertex i lie the `pairs` (3 F', 2) from `corners[i]`
+    to `corners[i + 1]`: the other two vertices of each of its faces, in order, without the fans.
+    """
+
+    faces: NDArray[np.uint32]
+    areas: Floats
+    chunks: NDArray[np.int64]
+    parts: NDArray[np.int64]
+    origins: NDArray[np.uint32]
+    corners: NDArray[np.uint32]
+    pairs: NDArray[np.uint32]
+
+
+@parallel_kernel
+def strain_cells(scales: Floats, out: Floats) -> None:
+    """How far each cell is from its rest length, |s - 1/s| / 2, out (N,)."""
+    for i in prange(len(out)):
+        out[i] = 0.5 * abs(scales[i] - 1.0 / scales[i])
+
+
+@parallel_kernel
+def push(x: Floats, shell: Shell, strains: Floats, fixed: NDArray[np.bool_], out: Floats) -> None:
+    """How a pressure pushes the vertices, out (N, 3): area vectors times the strain of their cells.
+
+    An area vector is the gradient of the volume. Fixed vertices are not pushed.
+    """
+    corners, pairs = shell.corners, shell.pairs
+    for index in prange(len(out)):
+        i = np.uint64(index)
+        a0 = a1 = a2 = 0.0
+        if not fixed[i]:
+            x0, x1, x2 = x[i, 0], x[i, 1], x[i, 2]
+            for h in range(np.uint64(corners[i]), np.uint64(corners[i + np.uint64(1)])):
+                j, k = np.uint64(pairs[h, 0]), np.uint64(pairs[h, 1])
+                b0, b1, b2 = x[j, 0] - x0, x[j, 1] - x1, x[j, 2] - x2
+                c0, c1, c2 = x[k, 0] - x0, x[k, 1] - x1, x[k, 2] - x2
+                a0 += b1 * c2 - b2 * c1
+                a1 += b2 * c0 - b0 * c2
+                a2 += b0 * c1 - b1 * c0
+            strain = strains[i] / 6.0
+            a0, a1, a2 = a0 * strain, a1 * strain, a2 * strain
+        out[i, 0], out[i, 1], out[i, 2] = a0, a1, a2
+
+
+@parallel_kernel
+def volume_terms(x: Floats, g: Floats, shell: Shell, strains: Floats, out: Floats) -> None:
+    """What each chunk of the shell adds to its component's volume, out (chunks, 5).
+
+    Columns 0 to 3 are the volume of x + m g as a polynomial in m, constant first; 4 the strains of
+    the cells, times the rest areas on them.
+    """
+    faces, chunks, origins, areas = shell.faces, shell.chunks, shell.origins, shell.areas
+    for chunk in prange(len(chunks) - 1):
+        o = np.uint64(origins[chunk])
+        o0, o1, o2 = x[o, 0], x[o, 1], x[o, 2]
+        t0 = t1 = t2 = t3 = strained = 0.0
+        for face in range(chunks[chunk], chunks[chunk + 1]):
+            i, j = np.uint64(faces[face, 0]), np.uint64(faces[face, 1])
+            k = np.uint64(faces[face, 2])
+            p = x[i, 0] - o0, x[i, 1] - o1, x[i, 2] - o2
+            q = x[j, 0] - o0, x[j, 1] - o1, x[j, 2] - o2
+            r = x[k, 0] - o0, x[k, 1] - o1, x[k, 2] - o2
+            u = g[i, 0], g[i, 1], g[i, 2]
+            v = g[j, 0], g[j, 1], g[j, 2]
+            w = g[k, 0], g[k, 1], g[k, 2]
+            qr, vw = _cross(q, r), _cross(v, w)
+            mixed = _cross(q, w), _cross(v, r)
+            t0 += _dot(p, qr)
+            t1 += _dot(u, qr) + _dot(p, mixed[0]) + _dot(p, mixed[1])
+            t2 += _dot(p, vw) + _dot(u, mixed[0]) + _dot(u, mixed[1])
+            t3 += _dot(u, vw)
+            strained += areas[face] * (strains[i] + strains[j] + strains[k])
+        out[chunk, 0], out[chunk, 1], out[chunk, 2] = t0 / 6.0, t1 / 6.0, t2 / 6.0
+        out[chunk, 3], out[chunk, 4] = t3 / 6.0, strained / 3.0
+
+
+_Vector = tuple[float, float, float]
+
+
+@kernel
+def _cross(a: _Vector, b: _Vector) -> _Vector:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@kernel
+def _dot(a: _Vector, b: _Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@parallel_kernel
+def add_scaled(pressures: Floats, part_of: NDArray[np.int64], g: Floats, x: Floats) -> None:
+    """Move each vertex of x (N, 3) along g (N, 3) by the pressure in its component."""
+    for i in prange(len(part_of)):
+        m = pressures[part_of[i]]
+        x[i, 0] += m * g[i, 0]
+        x[i, 1] += m * g[i, 1]
+        x[i, 2] += m * g[i, 2]
+
+
+@kernel
+def sum_parts(terms: Floats, parts: NDArray[np.int64], out: Floats) -> None:
+    """The terms of chunks (chunks, 5), each of the component in `parts`, summed into out (C, 5)."""
+    out[:] = 0.0
+    for chunk in range(len(parts)):
+        for term in range(5):
+            out[parts[chunk], term] += terms[chunk, term]
+
+
+@kernel
+def find_pressures(sums: Floats, rest: Floats, shape: Floats, gain: float, out: Floats) -> None:
+    """The pressure m in each component, out (C,), that gives its volume back, or `gain` of it.
+
+    From the sums (C, 5) of `volume_terms`, the volumes and areas at rest (C, 2), and the volumes of
+    the shape state (C,), which lead the way beyond one: what the shape state lost, gained.
+    """
+    for part in range(len(out)):
+        out[part] = 0.0
+        slope, volume = sums[part, 1], rest[part, 0]
+        if not slope > 1e-12 * abs(volume):
+            continue
+        wanted = min(gain, 1.0) * (volume - sums[part, 0])
+        if gain > 1.0:
+            ratio = min(max(volume / shape[part], 0.25), 4.0) if shape[part] != 0.0 else 1.0
+            wanted = volume * ratio ** (0.5 * (gain - 1.0)) - sums[part, 0]
+        strain = sums[part, 4] / max(rest[part, 1], _TINY)
+        most = _MOST * max(gain, 1.0) * abs(volume) * strain
+        wanted = min(max(wanted, -most), most)
+        out[part] = _first_root(slope, sums[part, 2], sums[part, 3], wanted)
+
+
+@kernel
+def _first_root(slope: float, curve: float, twist: float, wanted: float) -> float:
+    """Where slope m + curve m^2 + twist m^3 is `wanted`, or as near as it comes before it turns."""
+    # Beyond here it has lost its slope but for a quarter, and is about to turn.
+    lost = 0.75 * slope
+    bend = curve if wanted > 0.0 else -curve
+    spread = bend * bend - 3.0 * twist * lost
+    falling = math.sqrt(spread) - bend if spread > 0.0 else 0.0
+    farthest = lost / falling if falling > 0.0 else 4.0 * abs(wanted) / slope
+    m = 0.0
+    for _ in range(8):
+        tangent = slope + m * (2.0 * curve + 3.0 * twist * m)
+        m -= (m * (slope + m * (curve + twist * m)) - wanted) / max(tangent, 0.2 * slope)
+        m = min(max(m, -farthest), farthest)
+    return m
