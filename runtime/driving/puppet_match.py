@@ -17,9 +17,9 @@ from runtime.driving.polyline_driver import STRAIGHT_ON
 from runtime.driving.turn_limits import box_of, corners_of, limit_turns
 from runtime.puppet.puppet import Puppet
 from solvers.matching import SIZE_PREFERENCE, Match, TargetHierarchy
-from solvers.retarget.source_limbs import SimplifiedSource
 from solvers.retarget.match_hysteresis import MatchHysteresis, MatchHysteresisState
 from solvers.retarget.posture import likeness
+from solvers.retarget.source_limbs import SimplifiedSource
 
 CANDIDATES = 20  # matches that can be cycled through
 
