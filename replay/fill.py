@@ -67,6 +67,13 @@ class _Memory:
     root: Array
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class FillerState:
+    """The memories of all performers, the first seen first: number, (J,) of `_JOINT`, root (3,)."""
+
+    memories: tuple[tuple[int, Records, Array], ...]
+
+
 class Filler:
     """Fills frames of one skeleton; remembers each performer apart.
 
@@ -92,6 +99,22 @@ class Filler:
         self._unseen["rest"][root] = rest[root]
         self._unseen["seen_at"] = -np.inf
         self._memories: dict[int, _Memory] = {}
+
+    def snapshot(self) -> FillerState:
+        """Return a copy of all memories."""
+        return FillerState(
+            tuple(
+                (performer, memory.joints.copy(), memory.root.copy())
+                for performer, memory in self._memories.items()
+            )
+        )
+
+    def restore(self, state: FillerState) -> None:
+        """Go back to a snapshot of a filler of the same skeleton."""
+        self._memories = {
+            performer: _Memory(joints.copy(), root.copy())
+            for performer, joints, root in state.memories
+        }
 
     def fill(self, frame: SkeletonFrame) -> FilledFrame:
         """The frame with every joint placed; see `place`."""

@@ -1,4 +1,4 @@
-"""What conditioning knows of a skeleton beforehand: pairs, limbs, bones that keep their length."""
+"""Facts of a skeleton that conditioning needs: left-right pairs, limbs, long bones, feet."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from devices.skeleton import Skeleton
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-# What a tracker exchanges at once: whole arms and legs from where they leave the trunk, or only
-# what is beyond elbow and knee, so that each kind of joint is judged by itself.
+# A tracker exchanges whole arms or legs, or only the part beyond elbow or knee. So each kind of
+# joint is judged by itself.
 _GROUPS = {
     Kind.SHOULDER: 0,
     Kind.UPPER_ARM: 0,
@@ -35,13 +35,13 @@ class BodyAnatomy:
     """Anatomy of a skeleton's joints.
 
     Attributes:
-        partner: (J,) the same joint of the other side; itself in the middle.
-        group: (J,) which joints are exchanged together, -1 for none.
-        bones: (B,) the far ends of the limbs' long bones, whose length a person keeps.
+        partner: (J,) the same joint of the other side; a joint in the middle is its own.
+        group: (J,) the number of the joints that are exchanged together, -1 for none.
+        bones: (B,) the far ends of the limbs' long bones, which keep their length.
         near: (B,) their near ends.
-        beyond: (B, J) bool, the far end of each and all that hangs on it.
+        beyond: (B, J) bool, the far end of each bone and its descendants.
         feet: (F,) ankles and toes.
-        feet_rest: (F,) [m] how high above the floor these are as one stands.
+        feet_rest: (F,) [m] their heights above the floor in standing.
     """
 
     partner: Indices
@@ -54,7 +54,7 @@ class BodyAnatomy:
 
 
 def body_anatomy(skeleton: Skeleton) -> BodyAnatomy:
-    """The anatomy that a skeleton's names, or its shape, tell of."""
+    """Find the anatomy of a skeleton by its joint names, or by its shape."""
     parts = label_joints(skeleton)
     count = len(skeleton.names)
     partner, group = np.arange(count), np.full(count, -1)
@@ -102,7 +102,7 @@ def body_anatomy(skeleton: Skeleton) -> BodyAnatomy:
 
 
 def _beyond(skeleton: Skeleton, joints: list[int]) -> NDArray[np.bool_]:
-    """For each of the joints which (J,) are itself or hang on it."""
+    """Return for each of the joints (B, J) which joints are itself or its descendants."""
     out = np.zeros((len(joints), len(skeleton.names)), dtype=bool)
     out[np.arange(len(joints)), joints] = True
     for joint in skeleton.order[1:]:

@@ -1,6 +1,8 @@
-"""A T or A pose that is held: how a performer asks for calibration without a hand free."""
+"""Recognises a T or A pose kept still, by which a performer asks for calibration."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,21 +15,38 @@ from solvers.signal.continuity import distance
 
 Array = NDArray[np.float64]
 
-HOLD = 1.0  # [s]
+KEPT_STILL = 1.0  # [s] that the pose must be kept
 STILL = 0.3  # [m/s] that a hand may move meanwhile
-STRAIGHT = 0.94  # of the arm's bones that lies between shoulder and hand
-T_POSE = (-0.35, 0.35)  # sine of how far the arms point up
+STRAIGHT = 0.94  # least distance from shoulder to hand, as a share of the arm's bones
+T_POSE = (-0.35, 0.35)  # sine of the angle of the arms above the horizontal
 A_POSE = (-0.87, -0.42)
-ALIKE = 0.35  # between the sines of both arms
-SIDEWAYS = 0.8  # share of the level part of each arm that points to its own side
-UPRIGHT = 0.9  # cosine of the back from the vertical
+ALIKE = 0.35  # largest difference between the sines of both arms
+SIDEWAYS = 0.8  # least share of the horizontal part of each arm that points to its own side
+UPRIGHT = 0.9  # least cosine between the back and the vertical
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class CalibrationPoseState:
+    """What was seen of one performer's pose.
+
+    Attributes:
+        hands: (2, 3) [m] both hands in the last frame; None before the first.
+        at: [s] the last frame's time.
+        since: [s] when the pose was struck; NaN while it is not.
+        reported: whether this pose has been reported.
+    """
+
+    hands: Array | None
+    at: float
+    since: float
+    reported: bool
 
 
 class CalibrationPose:
-    """Watches one performer for a pose that is held.
+    """Watches one performer for a calibration pose.
 
     Args:
-        skeleton: one without arms or a back never strikes the pose.
+        skeleton: without arms or a back, the pose is never recognised.
     """
 
     def __init__(self, skeleton: Skeleton) -> None:
@@ -42,13 +61,23 @@ class CalibrationPose:
         self._hands: Array | None = None
         self._at = 0.0
         self._since = float("nan")
-        self._told = False
+        self._reported = False
+
+    def snapshot(self) -> CalibrationPoseState:
+        """Return what was seen so far."""
+        hands = None if self._hands is None else self._hands.copy()
+        return CalibrationPoseState(hands, self._at, self._since, self._reported)
+
+    def restore(self, state: CalibrationPoseState) -> None:
+        """Go back to a snapshot."""
+        self._hands = None if state.hands is None else state.hands.copy()
+        self._at, self._since, self._reported = state.at, state.since, state.reported
 
     def watch(self, positions: Array, filled: NDArray[np.bool_], time: float) -> bool:
-        """Whether the pose has just been held long enough; true once each time it is struck.
+        """Return whether the pose has now been kept for long enough; true once for each pose.
 
         Args:
-            positions: (J, 3) [m], level.
+            positions: (J, 3) [m], on a level floor.
             filled: (J,) which of them are guesses.
             time: [s].
         """
@@ -58,14 +87,14 @@ class CalibrationPose:
         hands, elapsed = self._hands, time - self._at
         self._hands, self._at = points[4:6], time
         moved = 0.0 if hands is None else float(np.abs(points[4:6] - hands).max())
-        still = hands is not None and 0.0 <= elapsed < HOLD and moved <= STILL * elapsed
+        still = hands is not None and 0.0 <= elapsed < KEPT_STILL and moved <= STILL * elapsed
         if not still or filled[self._joints].any() or not _struck(points):
-            self._since, self._told = float("nan"), False
+            self._since, self._reported = float("nan"), False
             return False
         if np.isnan(self._since):
             self._since = time
-        told, self._told = self._told, time - self._since >= HOLD
-        return self._told and not told
+        reported, self._reported = self._reported, time - self._since >= KEPT_STILL
+        return self._reported and not reported
 
 
 @kernel

@@ -1,6 +1,6 @@
-"""Faults of one body's frames: exchanged limbs are put right, what cannot be is not believed.
+"""Mends one performer's frames: puts exchanged limbs right and rejects impossible joints.
 
-Both are judged by where the joints were and how they moved when they were last believed.
+Both steps compare a joint with its place and velocity when it was last accepted.
 """
 
 from __future__ import annotations
@@ -19,31 +19,31 @@ from solvers.signal.continuity import LEAST_WRONG, distance, exchanged, expect
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Records = NDArray[np.void]
-Record = Any  # one of them, which numba writes through
+Record = Any  # one record, which numba writes through
 
-FORGET = 0.5  # [s] after which nothing is expected of a joint any more
-SHORTEST = 1e-3  # [s] between two frames, for velocities
-VELOCITY_SECONDS = 0.02  # [s] shorter steps tell too little of a velocity to go by
+FORGET = 0.5  # [s] unseen, after which a joint has no expected place
+VELOCITY_SECONDS = 0.02  # [s] a velocity is measured over no shorter time than this
 
-INSIST_AT_LEAST, INSIST_AT_MOST = 0.5, 10.0  # [s] that a device must say otherwise to be believed
+INSIST_AT_LEAST, INSIST_AT_MOST = 0.5, 10.0  # [s] of exchanged limbs after which they are accepted
 
-JUMP = 0.1  # [m] from where a joint is expected, at once
-FASTEST = 6.0  # [m/s] further, for each second since it was believed
-LONGEST_REACH = 0.1  # [s] for which that goes on
-BELIEVED = 3  # frames after which a joint is known well enough to be doubted
-CONFIRMED_SECONDS = 0.12  # [s] in one place after which a joint is believed there
-CONFIRMED_CUT = 2  # frames after which a jump of the whole body is believed
-CUT = 0.6  # of the joints seen that jump at once: that is no fault of a joint
+JUMP = 0.1  # [m] from its expected place that a joint may be at once
+FASTEST = 6.0  # [m/s] further, for each second since it was accepted
+LONGEST_REACH = 0.1  # [s] for which that grows
+BELIEVED = 3  # frames after which a joint is known well enough to be rejected
+CONFIRMED_SECONDS = 0.12  # [s] in one place after which a rejected joint is accepted there
+CONFIRMED_CUT = 2  # frames after which a jump of the whole body is accepted
+CUT = 0.6  # share of the seen joints that jump together where the whole body jumps
 
-STRETCHED = 0.47  # of the logarithm of a bone's length: by 1.6
-STRETCHED_BY = 0.12  # [m] and so much at least
-BONE_STEP = 0.02  # of its length that a bone's usual length gives way, each frame
-BONES_MEASURED = 10  # frames
+STRETCHED = 0.47  # change of the logarithm of a bone's length: a factor of 1.6
+STRETCHED_BY = 0.12  # [m] least change of a stretched bone's length
+BONE_STEP = 0.02  # share of its length by which a bone's usual length adapts each frame
+BONES_MEASURED = 10  # frames after which a bone's usual length is known
 
 
-# Of each joint: its partner, and its limbs. Where and when it was last believed,
-# its velocity, how often; where and since when it has been doubted, how often. In this frame: where
-# it is expected, how far from there it is and may be, whether it was corrected.
+# Of each joint: its partner on the other side, and its limb. When last accepted: its place, time
+# and velocity, and the number of times. While rejected: its place, since when, and the number of
+# times. In this frame: its expected place, its distance from there, the distance allowed, and
+# whether it was corrected.
 _JOINT = np.dtype(
     [
         ("partner", np.int64),
@@ -63,12 +63,12 @@ _JOINT = np.dtype(
     align=True,
 )
 
-# Of each long bone: its ends, its usual length, how often that was measured.
+# Of each long bone: its ends, its usual length, and the number of measurements.
 _BONE = np.dtype(
     [("far", np.int64), ("near", np.int64), ("usual", np.float64), ("measured", np.int64)]
 )
 
-# Of each pair of limbs: since when they are exchanged, and since when they were not; NaN for never.
+# Of each pair of limbs: since when they are exchanged, and since when they were not; NaN: never.
 _LIMB = np.dtype([("since", np.float64), ("straight", np.float64)])
 
 
@@ -77,12 +77,21 @@ class Mended:
     """A frame's joints after its faults are mended.
 
     Attributes:
-        positions: (J, 3) [m]; NaN where not seen or not believed.
-        corrected: (J,) bool, the joint was seen, but not believed or called by its partner's name.
+        positions: (J, 3) [m]; NaN where not seen or rejected.
+        corrected: (J,) bool, the joint was seen, and rejected or exchanged with its partner.
     """
 
     positions: Array
     corrected: Bools
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FaultsState:
+    """The memory of one performer's mending: (J,) of `_JOINT`, (B,) of `_BONE`, (L,) of `_LIMB`."""
+
+    joints: Records
+    bones: Records
+    limbs: Records
 
 
 class Faults:
@@ -90,7 +99,7 @@ class Faults:
 
     Args:
         body: the skeleton's anatomy.
-        joints: how many the skeleton has.
+        joints: the skeleton's number of joints.
     """
 
     def __init__(self, body: BodyAnatomy, joints: int) -> None:
@@ -103,18 +112,26 @@ class Faults:
         self._beyond = body.beyond
         self._limbs = np.full(int(body.group.max(initial=-1)) + 1, np.nan, _LIMB)
 
+    def snapshot(self) -> FaultsState:
+        """Return a copy of the memory."""
+        return FaultsState(self._joints.copy(), self._bones.copy(), self._limbs.copy())
+
+    def restore(self, state: FaultsState) -> None:
+        """Go back to a snapshot."""
+        self._joints[:], self._bones[:], self._limbs[:] = state.joints, state.bones, state.limbs
+
     def mend(self, positions: Array, time: float, *, swaps: bool, outliers: bool) -> Mended:
-        """The frame with its faults mended.
+        """Return the frame with its faults mended.
 
         Args:
-            positions: (J, 3) [m]; NaN where not seen, and what `replay.fill` does not count as
-                seen either.
+            positions: (J, 3) [m]; NaN where not seen. A place that `replay.fill` counts as not
+                seen counts as not seen here, too.
             time: [s].
             swaps: put exchanged limbs right.
-            outliers: reject what cannot be.
+            outliers: reject joints that jump, and the ends of stretched bones.
 
         Raises:
-            ValueError: it has not the skeleton's number of joints.
+            ValueError: the frame does not have the skeleton's number of joints.
         """
         if positions.shape != (len(self._joints), 3):
             raise ValueError(f"Expected positions {(len(self._joints), 3)}, got {positions.shape}")
@@ -130,7 +147,7 @@ class Faults:
 
 @kernel
 def _expect(joints: Records, positions: Array, time: float) -> bool:
-    """Tell where each joint should be; whether any is far enough from there to be exchanged."""
+    """Set each joint's expected place; return whether any is far enough from it to be exchanged."""
     wrong = False
     for index, joint in enumerate(joints):
         gap = time - joint.at
@@ -148,12 +165,12 @@ def _expect(joints: Records, positions: Array, time: float) -> bool:
 
 @kernel
 def _put_right(joints: Records, limbs: Records, positions: Array, time: float, wrong: bool) -> None:
-    """Give joints that bear their partners' names their own.
+    """Exchange the joints of limbs whose sides are exchanged.
 
-    A device that goes on saying so for longer than it had said otherwise is believed.
+    Limbs that stay exchanged for longer than they were straight before are accepted as they are.
     """
     told = np.zeros(len(limbs), dtype=np.bool_)
-    if wrong:  # else nothing can be
+    if wrong:  # else no limb can be exchanged
         told = exchanged(positions, joints["wanted"], joints["partner"], joints["limb"])
     insists = np.zeros(len(limbs), dtype=np.bool_)
     for index, limb in enumerate(limbs):
@@ -167,7 +184,7 @@ def _put_right(joints: Records, limbs: Records, positions: Array, time: float, w
         if joint.limb < 0 or not told[joint.limb]:
             continue
         if insists[joint.limb]:
-            joint.at = -np.inf  # nothing is known any more of this limb
+            joint.at = -np.inf  # forget the limb's motion
         elif index < other:
             for axis in range(3):
                 mine = positions[index, axis]
@@ -180,7 +197,7 @@ def _put_right(joints: Records, limbs: Records, positions: Array, time: float, w
 
 @kernel
 def _insists(limb: Record, time: float) -> bool:
-    """Whether a device has said for long enough that a limb's sides are the other way round."""
+    """Return whether a limb has been exchanged for long enough to be accepted as it is."""
     if np.isnan(limb.since):
         limb.since = time
     before = 0.0 if np.isnan(limb.straight) else limb.since - limb.straight
@@ -192,7 +209,7 @@ def _insists(limb: Record, time: float) -> bool:
 
 @kernel
 def _reject(joints: Records, bones: Records, beyond: Bools, positions: Array, time: float) -> None:
-    """Make joints unseen that jump, or whose bones have not their usual length."""
+    """Mark joints as unseen that jump, or whose bones do not have their usual length."""
     stretched = _stretched(joints, bones, beyond, positions)
     seen, far = 0, 0
     for index, joint in enumerate(joints):
@@ -213,13 +230,13 @@ def _reject(joints: Records, bones: Records, beyond: Bools, positions: Array, ti
 
 @kernel
 def _jumped(joint: Record) -> bool:
-    # Never where nothing is expected: `off` is NaN there.
+    # Never without an expected place: `off` is NaN then.
     return bool(joint.times >= BELIEVED and joint.off > joint.reach)
 
 
 @kernel
 def _confirmed(joint: Record, place: Array, time: float, cut: bool) -> bool:
-    """Whether a doubtful joint has been so near one place for so long that it is there."""
+    """Return whether a rejected joint has stayed in one place for long enough to be accepted."""
     since = max(time - joint.doubted_at, 0.0) if joint.doubts > 0 else 0.0
     still = distance(place, joint.doubted) < JUMP + 2.0 * since
     joint.doubts = joint.doubts + 1 if still else 1
@@ -233,9 +250,10 @@ def _confirmed(joint: Record, place: Array, time: float, cut: bool) -> bool:
 
 @kernel
 def _stretched(joints: Records, bones: Records, beyond: Bools, positions: Array) -> Bools:
-    """The less expected ends (J,) of the long bones that have not their usual length.
+    """Which joints (J,) are the less expected ends of bones without their usual length.
 
-    What hangs on them went along, unless the next bone too is stretched at this end.
+    The joints beyond such an end moved along with it, unless the next bone is stretched at this
+    end, too.
     """
     near, far = np.zeros(len(joints), dtype=np.bool_), np.zeros(len(bones), dtype=np.bool_)
     for index, bone in enumerate(bones):
@@ -253,9 +271,9 @@ def _stretched(joints: Records, bones: Records, beyond: Bools, positions: Array)
 
 @kernel
 def _changed(bone: Record, length: float) -> bool:
-    """Whether a bone's length is not its usual one, which gives way.
+    """Return whether a bone's length differs from the usual one; adapt the usual one to it.
 
-    So nobody needs to confirm what is rejected for it.
+    A real change is accepted by that after a while, without a confirmation.
     """
     if not 0.0 < length < np.inf:
         return False
@@ -275,7 +293,7 @@ def _known(off: float) -> float:
 
 @kernel
 def _believe(joints: Records, positions: Array, time: float) -> None:
-    """Remember where joints are and how they move."""
+    """Remember the places and velocities of the accepted joints."""
     for index, joint in enumerate(joints):
         place = positions[index]
         if np.isnan(place[0]):

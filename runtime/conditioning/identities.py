@@ -1,8 +1,8 @@
-"""Steady identities: who comes back under a new number is known by where they are and their size.
+"""Keeps each performer's number when the sensor gives them a new one.
 
-Sensors number bodies anew whenever they lose one. Whoever was seen within the last seconds is
-remembered; a body that appears near where somebody should be by now, of the same size, is that
-somebody. All bodies of one capture are matched together.
+Sensors number bodies anew whenever they lose one. Performers are remembered for some seconds. A
+body that appears near the expected place of one of them, and has the same size, is taken to be that
+performer. All bodies of one capture are matched together.
 """
 
 from __future__ import annotations
@@ -21,19 +21,27 @@ from solvers.signal.association import associate
 
 Array = NDArray[np.float64]
 
-MEMORY = 3.0  # [s] that somebody who is gone is remembered
-NEAR = 0.15  # [m] from the place expected, at once
-FASTEST = 3.0  # [m/s] further for each second gone
+MEMORY = 3.0  # [s] that a lost performer is remembered
+NEAR = 0.15  # [m] from the expected place that a performer may be at once
+FASTEST = 3.0  # [m/s] further for each second lost
 FURTHEST = 1.5  # [m] at most
-ALIKE = 0.25  # of the logarithm of two bodies' sizes
-CARRIED_ON = 0.3  # [s] that a walk is expected to go on
+ALIKE = 0.25  # largest difference of the logarithms of two sizes of one performer
+CARRIED_ON = 0.3  # [s] for which a velocity is expected to last
 MOST_TRACKS = 64
-MOST_NUMBER = 1000  # of a sensor that is used as it is
+MOST_NUMBER = 1000  # numbers of a sensor below this are used unchanged
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class _Track:
-    """One person: the steady number, the sensor's, newest frame, the hips' place and velocity."""
+    """One performer.
+
+    Attributes:
+        number: the steady number.
+        name: the sensor's number, -1 for none.
+        frame: the newest frame.
+        place: (3,) [m] of the hips; None before they were seen.
+        velocity: (3,) [m/s] of the hips.
+    """
 
     number: int
     name: int
@@ -42,8 +50,15 @@ class _Track:
     velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class IdentitiesState:
+    """The tracks of all performers, the longest known first."""
+
+    tracks: tuple[_Track, ...]
+
+
 class Identities:
-    """Gives each performer a number that stays.
+    """Gives each performer a steady number.
 
     Args:
         skeleton: of all frames.
@@ -53,18 +68,27 @@ class Identities:
         self._hips = hips_joint(skeleton)
         bones = skeleton.parents >= 0
         self._bones = np.flatnonzero(bones), skeleton.parents[bones]
-        self._tracks: list[_Track] = []
+        self._tracks: dict[int, _Track] = {}  # by number, the longest known first
+
+    def snapshot(self) -> IdentitiesState:
+        """Return all tracks."""
+        return IdentitiesState(tuple(self._tracks.values()))
+
+    def restore(self, state: IdentitiesState) -> None:
+        """Go back to a snapshot."""
+        self._tracks = {track.number: track for track in state.tracks}
 
     def steady(self, frames: Sequence[SkeletonFrame]) -> list[SkeletonFrame]:
-        """The frames, oldest first, with steady numbers.
+        """Return the frames, oldest first, with steady numbers.
 
-        Frames of one time that come together are one capture and matched together.
+        Frames of one time that come together are one capture, whose bodies are matched together.
         """
         return [frame for capture in _captures(frames) for frame in self._name(capture)]
 
     def _name(self, capture: Sequence[SkeletonFrame]) -> Iterator[SkeletonFrame]:
         time = capture[0].time
-        self._tracks = [t for t in self._tracks if time - t.frame.time <= MEMORY][-MOST_TRACKS:]
+        known = [t for t in self._tracks.values() if time - t.frame.time <= MEMORY][-MOST_TRACKS:]
+        self._tracks = {track.number: track for track in known}
         places = [self._place(frame) for frame in capture]
         tracks = self._same(capture, places)
         if tracks is None:
@@ -77,8 +101,8 @@ class Identities:
     def _same(
         self, capture: Sequence[SkeletonFrame], places: Sequence[tuple[float, float, float] | None]
     ) -> list[_Track] | None:
-        """Who they are where everybody is known and near where they were: nearly always."""
-        by_name = {track.name: track for track in self._tracks}
+        """The tracks of a capture if all numbers are known and near their places; else None."""
+        by_name = {track.name: track for track in self._tracks.values()}
         tracks = []
         for frame, place in zip(capture, places, strict=True):
             track = by_name.get(frame.performer)
@@ -95,12 +119,12 @@ class Identities:
     def _match(
         self, capture: Sequence[SkeletonFrame], places: Sequence[tuple[float, float, float] | None]
     ) -> list[_Track]:
-        time = capture[0].time
-        shape = len(capture), len(self._tracks)
+        time, known = capture[0].time, list(self._tracks.values())
+        shape = len(capture), len(known)
         distance, within = np.full(shape, FURTHEST), np.zeros(shape, dtype=bool)
         same = np.zeros(shape, dtype=bool)
         for row, (frame, place) in enumerate(zip(capture, places, strict=True)):
-            for column, track in enumerate(self._tracks):
+            for column, track in enumerate(known):
                 same[row, column] = track.name == frame.performer
                 gap = time - track.frame.time
                 if place is None or track.place is None:
@@ -109,42 +133,37 @@ class Identities:
                 near = gap > 0.0 and distance[row, column] <= _reach(gap)
                 within[row, column] = near and self._alike(frame, track.frame)
         found = associate(distance, same, within).tolist()
-        known = list(self._tracks)
-        for index in found:  # a number now borne by another is nobody's
-            if index >= 0:
-                known[index].name = -1
-        names = {frame.performer for frame in capture}
-        for track in known:
-            track.name = -1 if track.name in names else track.name
+        names = {frame.performer for frame in capture}  # the sensor gives these to others now
+        for index, track in enumerate(known):
+            if index in found or track.name in names:
+                known[index] = self._tracks[track.number] = replace(track, name=-1)
         return [
             known[index] if index >= 0 else self._newcomer(frame)
             for index, frame in zip(found, capture, strict=True)
         ]
 
     def _newcomer(self, frame: SkeletonFrame) -> _Track:
-        taken = {track.number for track in self._tracks}
         number = frame.performer
-        if number in taken or not 0 <= number < MOST_NUMBER:
-            number = next(n for n in range(len(taken) + 1) if n not in taken)
-        track = _Track(number, frame.performer, frame, None)
-        self._tracks.append(track)
+        if number in self._tracks or not 0 <= number < MOST_NUMBER:
+            number = next(n for n in range(len(self._tracks) + 1) if n not in self._tracks)
+        track = self._tracks[number] = _Track(number, frame.performer, frame, None)
         return track
 
     def _follow(
         self, track: _Track, frame: SkeletonFrame, place: tuple[float, float, float] | None
     ) -> None:
-        gap = frame.time - track.frame.time
+        gap, velocity = frame.time - track.frame.time, track.velocity
         if place is not None and track.place is not None and 0.0 < gap < CARRIED_ON:
             (x, y, z), (u, v, w), (a, b, c) = place, track.velocity, track.place
-            track.velocity = (
+            velocity = (
                 0.5 * ((x - a) / gap + u),
                 0.5 * ((y - b) / gap + v),
                 0.5 * ((z - c) / gap + w),
             )
         elif gap >= CARRIED_ON:
-            track.velocity = 0.0, 0.0, 0.0
-        track.place = track.place if place is None else place
-        track.name, track.frame = frame.performer, frame
+            velocity = 0.0, 0.0, 0.0
+        place = track.place if place is None else place
+        self._tracks[track.number] = _Track(track.number, frame.performer, frame, place, velocity)
 
     def _place(self, frame: SkeletonFrame) -> tuple[float, float, float] | None:
         x, y, z = frame.positions[self._hips].tolist()
@@ -157,7 +176,7 @@ class Identities:
         return x, y, z
 
     def _alike(self, a: SkeletonFrame, b: SkeletonFrame) -> bool:
-        """Whether two bodies are of one size, as far as both are seen."""
+        """Return whether two bodies have the same size, by the bones that are seen in both."""
         far, near = self._bones
         ours, theirs = (
             np.linalg.norm(f.positions[far] - f.positions[near], axis=1) for f in (a, b)
@@ -169,7 +188,7 @@ class Identities:
 
 
 def _captures(frames: Sequence[SkeletonFrame]) -> Iterator[list[SkeletonFrame]]:
-    """Frames of one time, as long as no performer occurs twice among them."""
+    """Group frames of one time, with no performer twice in a group."""
     for _, group in groupby(frames, key=lambda frame: frame.time):
         capture: list[SkeletonFrame] = []
         for frame in group:

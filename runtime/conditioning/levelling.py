@@ -1,12 +1,13 @@
-"""The floor brought to y = 0, by where the feet have stood.
+"""Finds the floor from where the feet have stood, and brings it to y = 0.
 
-Devices that see the floor themselves, or feel how they are tilted, have levelled their frames
-already (`devices.bodies.camera_level`); then there is little left to do here.
+Adapters of devices that see the floor, or measure their own tilt, have levelled their frames
+already (`devices.bodies.camera_level`); the correction here is then small.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,20 +15,20 @@ from numpy.typing import NDArray
 from replay.orientation import upright
 from runtime.conditioning.body_anatomy import BodyAnatomy
 from solvers.kernels.compiled import kernel
-from solvers.signal.floor_plane import FloorFit
+from solvers.signal.floor_plane import FloorFit, FloorState
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Records = NDArray[np.void]
 
 EVERY, LONGEST = 0.1, 0.5  # [s] between two looks at the feet
-STILL = 0.25  # [m/s] a foot that stands is slower
-LOWEST = 0.05  # [m] and no higher above the lowest foot
-JUMPED = 0.15  # [m] above the floor as known, where a foot is in the air
+STILL = 0.25  # [m/s] a standing foot is slower
+LOWEST = 0.05  # [m] a standing foot is no higher above the lowest one
+JUMPED = 0.15  # [m] a foot this far above the known floor is in the air
 KNOWN = 1.0  # [s] of standing after which the floor is known
 
-# Of each foot: its joint and how high that is when one stands; where it was at the last look, and
-# whether it has stood still since the one before.
+# Of each foot: its joint, and the joint's height above the floor in standing; its place at the last
+# look, and whether it stood still since the look before.
 _FOOT = np.dtype(
     [
         ("joint", np.int64),
@@ -37,6 +38,25 @@ _FOOT = np.dtype(
     ],
     align=True,
 )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LevellingState:
+    """What is known of a floor.
+
+    Attributes:
+        feet: (F,) of `_FOOT`.
+        fit: the plane under the feet.
+        at: [s] the last look at the feet.
+        turn: (3, 3) rotation that makes the floor level.
+        rise: [m] that then brings it to y = 0.
+    """
+
+    feet: Records
+    fit: FloorState
+    at: float
+    turn: Array
+    rise: float
 
 
 class Levelling:
@@ -54,11 +74,22 @@ class Levelling:
         self._turn, self._rise = np.eye(3), 0.0
 
     def forget(self) -> None:
-        """Look for the floor anew, from the next step on; until then it stays."""
+        """Measure the floor anew; the last correction stays until the next step."""
         self._fit = FloorFit()
 
+    def snapshot(self) -> LevellingState:
+        """Return a copy of what is known of the floor."""
+        feet, fit, turn = self._feet.copy(), self._fit.snapshot(), self._turn.copy()
+        return LevellingState(feet, fit, self._at, turn, self._rise)
+
+    def restore(self, state: LevellingState) -> None:
+        """Go back to a snapshot."""
+        self._feet[:], self._at = state.feet, state.at
+        self._fit.restore(state.fit)
+        self._turn, self._rise = state.turn.copy(), state.rise
+
     def watch(self, positions: Array, filled: Bools, time: float) -> None:
-        """Learn from where the feet are: (J, 3) [m], and (J,) which of them are guesses."""
+        """Learn the floor from positions (J, 3) [m]; joints `filled` (J,) are guesses."""
         elapsed = time - self._at
         if 0.0 <= elapsed < EVERY or not len(self._feet):
             return
@@ -69,14 +100,14 @@ class Levelling:
             soles = soles[self.level(soles)[:, 1] < JUMPED]
         if len(soles):
             self._fit.add(soles, elapsed)
-            self._hold(*self._fit.plane())
+            self._correct(*self._fit.plane())
 
     def level(self, positions: Array) -> Array:
         """Positions (J, 3) [m] with the floor at y = 0."""
         return _levelled(positions, self._turn, self._rise)
 
-    def _hold(self, a: float, b: float, height: float) -> None:
-        """Bring y = a x + b z + height to y = 0, turning about the origin."""
+    def _correct(self, a: float, b: float, height: float) -> None:
+        """Let the correction bring y = a x + b z + height to y = 0, turning about the origin."""
         upward = 1.0 / math.sqrt(1.0 + a * a + b * b)
         self._turn = upright(np.array([-a, 1.0, -b]) * upward)
         self._rise = -height * upward
@@ -84,7 +115,7 @@ class Levelling:
 
 @kernel
 def _standing(feet: Records, positions: Array, filled: Bools, reach: float) -> Array:
-    """Where soles (n, 3) [m] are that moved by less than `reach` [m] and are not in the air."""
+    """The soles (n, 3) [m] that moved by less than `reach` [m] and are not in the air."""
     soles = np.empty((len(feet), 3))
     for index, foot in enumerate(feet):
         place = positions[foot.joint]

@@ -1,4 +1,4 @@
-"""The mirror: left is right, in names and in space, so that the limbs do not cross."""
+"""Exchange of left and right, in joint names and in space, so that the limbs do not cross."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ ACROSS = np.array([-1.0, 1.0, 1.0])
 
 
 def mirrored(positions: Array, partner: NDArray[np.int64]) -> Array:
-    """Positions (J, 3) [m] as in a mirror that the performer faces; twice is as before.
+    """Return positions (J, 3) [m] as in a mirror that the performer faces; twice restores them.
 
     Args:
-        positions: (J, 3).
-        partner: (J,) the same joint of the other side; itself in the middle.
+        positions: (J, 3) [m].
+        partner: (J,) the same joint of the other side; a joint in the middle is its own.
     """
     seen: Array = positions[partner] * ACROSS
     return seen

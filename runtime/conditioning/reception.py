@@ -1,26 +1,35 @@
-"""The first steps, which look at every frame of a stream: its order, and who is who."""
+"""The two steps that see every frame of a stream: order in time, and steady performer numbers."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 from devices.skeleton import Skeleton, SkeletonFrame
-from runtime.conditioning.identities import Identities
+from runtime.conditioning.identities import Identities, IdentitiesState
 from runtime.conditioning.switches import Conditioning
-from runtime.conditioning.timeline import Timeline
+from runtime.conditioning.timeline import Timeline, TimelineState
 
-MOST_AT_ONCE = 128  # frames of one poll that are looked at, the newest; a flood brings thousands
+MOST_AT_ONCE = 128  # newest frames of one poll that are taken; a flood brings thousands
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ReceptionState:
+    """The states of both steps."""
+
+    timeline: TimelineState
+    identities: IdentitiesState
 
 
 class Reception:
-    """Lets frames in that come in order, each under its performer's own number.
+    """Admits frames that come in order, each under its performer's steady number.
 
     Args:
         skeleton: of all frames.
-        switches: what is done; looked at whenever frames come.
+        switches: which steps are taken; read whenever frames come.
 
     Attributes:
-        timeline: the show's clock, and what it has dropped.
+        timeline: the show's clock, and the counts of dropped frames.
     """
 
     def __init__(self, skeleton: Skeleton, switches: Conditioning) -> None:
@@ -28,8 +37,17 @@ class Reception:
         self._switches = switches
         self._identities = Identities(skeleton)
 
+    def snapshot(self) -> ReceptionState:
+        """Return the states of both steps."""
+        return ReceptionState(self.timeline.snapshot(), self._identities.snapshot())
+
+    def restore(self, state: ReceptionState) -> None:
+        """Go back to a snapshot."""
+        self.timeline.restore(state.timeline)
+        self._identities.restore(state.identities)
+
     def receive(self, frames: Sequence[SkeletonFrame]) -> Sequence[SkeletonFrame]:
-        """Those of the frames, and of the newest only, that are let in; oldest first."""
+        """Return the admitted frames, oldest first; of a flood only the newest are seen."""
         frames = frames[-MOST_AT_ONCE:]
         if self._switches.order:
             admitted = (self.timeline.admit(frame) for frame in frames)

@@ -1,6 +1,8 @@
-"""Joints that are believed again go to where they are seen within a moment; they do not jump."""
+"""Joints that are seen again move from their guessed place to the seen one; they do not jump."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,11 +14,11 @@ Bools = NDArray[np.bool_]
 Records = NDArray[np.void]
 
 SECONDS = 0.15
-FORGET = 0.5  # [s] without a frame after which nobody remembers where joints were shown
-NEARLY = 0.02  # [m] that nobody sees as a jump
+FORGET = 0.5  # [s] without a frame after which the places shown are forgotten
+NEARLY = 0.02  # [m] a step too small to look like a jump
 
-# Of each joint: when it was seen again, and how far from there it was shown then. In the frame
-# before: where it was shown, and whether that was a guess.
+# Of each joint: when it was seen again, and the way from the seen place to the one shown then. In
+# the frame before: the place shown, and whether that was a guess.
 _JOINT = np.dtype(
     [
         ("since", np.float64),
@@ -28,11 +30,19 @@ _JOINT = np.dtype(
 )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class RejoiningState:
+    """The memory of one performer's rejoining: (J,) of `_JOINT`, and the last frame's time [s]."""
+
+    joints: Records
+    at: float
+
+
 class Rejoining:
-    """Leads the joints of one performer back from their guessed places.
+    """Moves the joints of one performer back from their guessed places within `SECONDS`.
 
     Args:
-        joints: how many the skeleton has.
+        joints: the skeleton's number of joints.
     """
 
     def __init__(self, joints: int) -> None:
@@ -40,12 +50,20 @@ class Rejoining:
         self.forget()
 
     def forget(self) -> None:
-        """Show whatever comes next where it is."""
+        """Show the next frame as it is."""
         self._at = float("nan")
         self._joints["since"] = -np.inf
 
+    def snapshot(self) -> RejoiningState:
+        """Return a copy of the memory."""
+        return RejoiningState(self._joints.copy(), self._at)
+
+    def restore(self, state: RejoiningState) -> None:
+        """Go back to a snapshot."""
+        self._joints[:], self._at = state.joints, state.at
+
     def lead(self, positions: Array, filled: Bools, time: float) -> tuple[Array, Bools]:
-        """Where joints (J, 3) [m] are shown, and which (J,) of them are on their way.
+        """Return the places to show (J, 3) [m], and which joints (J,) are on their way.
 
         Args:
             positions: (J, 3) [m], all finite.

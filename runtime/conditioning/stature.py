@@ -1,8 +1,9 @@
-"""How tall a performer is beside the skeleton's rest pose, measured while they begin."""
+"""The size of a performer relative to the skeleton's rest pose, from their first second."""
 
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from statistics import median
 
 import numpy as np
@@ -16,20 +17,35 @@ Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Indices = NDArray[np.int64]
 
-SECONDS = 1.0  # [s] that are measured; after them nobody grows
+SECONDS = 1.0  # [s] that are measured; the size is fixed afterwards
 LEAST_BONE = 0.05  # [m] at rest; shorter ones are mostly noise
-SAME = 0.02  # that is no difference
-MOST = 3.0  # times as tall, or as small
+SAME = 0.02  # a smaller difference counts as none
+MOST = 3.0  # the largest factor, and one over the smallest
+
+
+@dataclass(frozen=True, slots=True)
+class StatureState:
+    """The measurements of one performer.
+
+    Attributes:
+        factor: the factor that came of them.
+        sizes: one size for each frame measured.
+        until: [s] when measuring ends; NaN before the first frame.
+    """
+
+    factor: float
+    sizes: tuple[float, ...]
+    until: float
 
 
 class Stature:
     """Measures one performer.
 
     Args:
-        skeleton: whose rest pose everybody is brought to.
+        skeleton: its rest pose gives the size that every performer is scaled to.
 
     Attributes:
-        factor: what positions are multiplied by.
+        factor: multiplied by it, the performer's positions have that size.
     """
 
     def __init__(self, skeleton: Skeleton) -> None:
@@ -41,13 +57,21 @@ class Stature:
         self.forget()
 
     def forget(self) -> None:
-        """Measure anew."""
+        """Measure anew from the next frame on."""
         self.factor = 1.0
         self._sizes: list[float] = []
         self._until = float("nan")
 
+    def snapshot(self) -> StatureState:
+        """Return the measurements so far."""
+        return StatureState(self.factor, tuple(self._sizes), self._until)
+
+    def restore(self, state: StatureState) -> None:
+        """Go back to a snapshot."""
+        self.factor, self._sizes, self._until = state.factor, list(state.sizes), state.until
+
     def watch(self, positions: Array, filled: Bools, time: float) -> None:
-        """Measure positions (J, 3) [m], `filled` (J,) being guesses, for the first second."""
+        """Measure positions (J, 3) [m] for the first second; joints `filled` (J,) are guesses."""
         if time > self._until:
             return
         size = _size(positions, filled, self._far, self._near, self._rest)
@@ -64,7 +88,7 @@ class Stature:
 
 @kernel
 def _size(positions: Array, filled: Bools, far: Indices, near: Indices, rest: Array) -> float:
-    """How many times as long as at rest the bones are in the middle; NaN where none was seen."""
+    """The median length of the bones seen, as a multiple of rest; NaN if no bone was seen."""
     ratios = np.empty(len(rest))
     seen = 0
     for bone, length in enumerate(rest):

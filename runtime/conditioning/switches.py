@@ -1,4 +1,4 @@
-"""What is done to a stream before it drives: one switch for each step."""
+"""The switches of conditioning: one for each step that a stream goes through."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ from devices.errors import InputError
 
 @dataclass(slots=True)
 class Conditioning:
-    """The steps of conditioning, each on or off; see the package for what they do.
+    """The steps of conditioning, each on or off; the package's docstring describes them.
 
-    Read once a frame, so that a key, the command line or a remote control may set any of them while
-    the show runs, from any thread.
+    The switches are read once a frame. Keys, the command line and the remote may set them while the
+    show runs, from any thread.
 
     Attributes:
-        order: drop duplicates and what comes late, and go on where a clock jumps.
-        identities: keep who is who when the sensor gives somebody a new number.
+        order: drop duplicate and late frames, and keep time rising where a clock jumps.
+        identities: keep each performer's number when the sensor gives a new one.
         swaps: put limbs right whose left and right are exchanged.
-        outliers: do not believe joints that jump or bones that stretch.
+        outliers: reject joints that jump and bones that stretch.
         filter: smooth (One-Euro).
-        predict: show where joints will be one frame later.
+        predict: predict joints one frame ahead.
         level: make the floor level, at y = 0.
-        mirror: show the performer as in a mirror: left is right.
-        scale: make everybody as tall as the skeleton's rest pose.
-        recalibrate: take a T or A pose that is held for a second as the rest state.
+        mirror: exchange left and right.
+        scale: scale every performer to the size of the skeleton's rest pose.
+        recalibrate: take a T or A pose kept still for a second as the rest state.
     """
 
     order: bool = True
@@ -40,10 +40,10 @@ class Conditioning:
     recalibrate: bool = False
 
     def switch(self, name: str, on: bool | None = None) -> bool:
-        """Set one switch, or turn it over where `on` is None; what it is now.
+        """Set one switch, or reverse it where `on` is None; return its new value.
 
         Raises:
-            InputError: there is no such switch.
+            InputError: no switch has this name.
         """
         if name not in SWITCHES:
             raise InputError(f"no switch is called {name!r}; there are: {', '.join(SWITCHES)}")
@@ -56,21 +56,21 @@ SWITCHES = tuple(field.name for field in fields(Conditioning))
 
 
 def for_live() -> Conditioning:
-    """What a live stream is given unless asked otherwise."""
+    """The default switches of a live stream."""
     return Conditioning()
 
 
 def for_recording() -> Conditioning:
-    """What a recording is given: only faults are mended.
+    """The default switches of a recording: only faults are mended.
 
-    Readers have put its frames in order and its floor level, nobody waits for it, so that smoothing
-    would only take detail away, and clean motion capture passes unchanged.
+    Readers have put its frames in order and made its floor level. Smoothing would only remove
+    detail. Clean motion capture passes unchanged.
     """
     return Conditioning(order=False, filter=False, level=False, scale=False)
 
 
 def asked_for(switches: Conditioning, wanted: Mapping[str, bool | None]) -> Conditioning:
-    """The switches with those set that somebody asked for; None where nobody did."""
+    """Set the switches that `wanted` gives a value for; None leaves a switch as it is."""
     for name in SWITCHES:
         if wanted.get(name) is not None:
             switches.switch(name, wanted[name])
@@ -78,5 +78,5 @@ def asked_for(switches: Conditioning, wanted: Mapping[str, bool | None]) -> Cond
 
 
 def filled_only() -> Conditioning:
-    """Nothing but what nothing after can do without: every joint has a place."""
+    """All switches off: only unseen joints are filled, which later stages require."""
     return Conditioning(**dict.fromkeys(SWITCHES, False))

@@ -11,7 +11,7 @@ from devices.bodies.joint_labels import heading_joints, hips_joint, label_joints
 from devices.bodies.joint_names import Kind
 from devices.bodies.source_joints import source_joints, source_tree
 from devices.skeleton import Skeleton, SkeletonFrame
-from runtime.conditioning.conditioner import Conditioner, warm
+from runtime.conditioning.conditioner import Conditioner, ConditionerState, warm
 from runtime.conditioning.mirror import mirrored
 from runtime.conditioning.switches import Conditioning, filled_only
 from solvers.retarget.heading import heading, turned
@@ -82,6 +82,15 @@ def rest_state(pose: Pose, heading: float | None = None) -> Rest:
     return Rest(pose.facing(under), under, height)
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class PerformerState:
+    """The memory of a performer: of the conditioning, the newest heading [rad] and pose."""
+
+    conditioner: ConditionerState
+    heading: float
+    pose: Pose | None
+
+
 class Performer:
     """Follows one performer from frame to frame.
 
@@ -138,10 +147,19 @@ class Performer:
         )
         return self.pose
 
+    def snapshot(self) -> PerformerState:
+        """Return the memory between two frames; poses are immutable and shared."""
+        return PerformerState(self._conditioner.snapshot(), self._heading, self.pose)
+
+    def restore(self, state: PerformerState) -> None:
+        """Go back to a snapshot of a performer with the same skeleton."""
+        self._conditioner.restore(state.conditioner)
+        self._heading, self.pose = state.heading, state.pose
+
     @property
     def calibrates(self) -> bool:
         """Whether the newest pose is a T or A that has been held, to be the rest state."""
-        return self._conditioner.held
+        return self._conditioner.calibrates
 
     def recalibrate(self) -> None:
         """Measure the floor and the performers' sizes anew."""

@@ -9,10 +9,19 @@ from devices.skeleton import SkeletonFrame
 PATIENCE = 0.5  # seconds that a lost performer's part is kept; sensors lose people for a moment
 
 
-@dataclass(slots=True)
+@dataclass(frozen=True, slots=True)
 class _Part:
+    """A part, its performer's number (None while it is free), and when they were last seen [s]."""
+
     performer: int | None = None
     seen: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class PerformerSlotsState:
+    """Which performer has each part, and when they were last seen."""
+
+    parts: tuple[_Part, ...]
 
 
 class PerformerSlots:
@@ -27,6 +36,14 @@ class PerformerSlots:
 
     def __init__(self, parts: int = 1) -> None:
         self._parts = [_Part() for _ in range(parts)]
+
+    def snapshot(self) -> PerformerSlotsState:
+        """Return which performer has each part."""
+        return PerformerSlotsState(tuple(self._parts))
+
+    def restore(self, state: PerformerSlotsState) -> None:
+        """Go back to a snapshot."""
+        self._parts = list(state.parts)
 
     def part(self, frame: SkeletonFrame) -> int | None:
         """The part that this frame's performer plays; None for a bystander."""
