@@ -393,7 +393,7 @@ def test_a_pose_held_for_a_second_calibrates_once(shape: dict[str, tuple[float, 
         asked = []
         for index in times:
             conditioner.condition(frame(positions, index * STEP))
-            asked.append(conditioner.held)
+            asked.append(conditioner.calibrates)
         return asked
 
     assert sum(held(pose(shape), range(28))) == 0, "not yet a second"
@@ -412,7 +412,7 @@ def test_a_pose_that_is_not_held_still_asks_for_nothing() -> None:
     for index in range(120):
         lean = 0.3 * np.sin(index * 0.5)
         conditioner.condition(frame(pose(T_POSE, moved=(lean, 0.0, 0.0)), index * STEP))
-        assert not conditioner.held
+        assert not conditioner.calibrates
 
 
 def test_an_unknown_switch_is_told_in_one_line() -> None:
