@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike
 from solvers.deform.arap_cells import SPOKES, SPOKES_AND_RIMS, build_cells
 from solvers.deform.arap_kernels import energy_terms, fit_cells, place_outside, pull_soft, residual
 from solvers.deform.arap_layout import (
-    Frame,
+    UnitBox,
     checked_mesh,
     checked_regions,
     checked_targets,
@@ -83,10 +83,10 @@ class ArapSolver:
         points, triangles = checked_mesh(vertices, faces)
         if energy not in ENERGIES:
             raise ValueError(f"unknown energy {energy!r}: use one of {', '.join(ENERGIES)}")
-        self._frame = Frame.around(points)
+        self._box = UnitBox.around(points)
         self._layout = layout = lay_out(points, triangles)
         self._handles = checked_handles(handles, groups, weights, layout)
-        self._rest = np.ascontiguousarray(self._frame.inside(points)[layout.order])
+        self._rest = np.ascontiguousarray(self._box.inside(points)[layout.order])
         self._mesh = build_cells(self._rest, layout.faces, energy)
         self._unit = float(self._mesh.laplacian.diagonal().mean()) or 1.0
         self._carried = CarriedParts.of(self._rest, self._handles, layout)
@@ -197,7 +197,7 @@ class ArapSolver:
         """Go back to a snapshot: the next solves give the same bytes as those after it did.
 
         The handles of that time are held again, which factors the system if others are held now.
-        `iron` lays flat what the next solve gives.
+        `flatten_folds` lays flat what the next solve gives.
 
         Raises:
             ValueError: a snapshot of a surface with another number of vertices; nothing changes.
@@ -231,18 +231,18 @@ class ArapSolver:
         Raises:
             ValueError: for targets of a wrong shape, not finite, or absurdly far away.
         """
-        goals = checked_targets(targets, len(self._handles.places), self._frame)
+        goals = checked_targets(targets, len(self._handles.places), self._box)
         if iterations < 0:
             raise ValueError(f"iterations must not be negative, got {iterations}")
         answer = np.empty_like(self._x) if out is None else out
         with threads_for(len(self._x)):
-            self._move_along(self._frame.inside(goals))
+            self._move_along(self._box.inside(goals))
             for _ in range(iterations):
                 self._local_step(self._x)
                 self._global_step()
             self._shown = self._pose_step() if iterations else self._x
-            frame, order = self._frame, self._layout.order
-            place_outside(self._shown, order, frame.centre, frame.size, answer)
+            box, order = self._box, self._layout.order
+            place_outside(self._shown, order, box.centre, box.size, answer)
         hard = self._handles.hard
         answer[self._layout.order[self._handles.places[hard]]] = goals[hard]
         return answer
@@ -267,9 +267,9 @@ class ArapSolver:
         rotations = self._R.copy()
         energy = self._energy_of(self._x)
         self._R[:] = rotations
-        return energy * self._frame.size**2
+        return energy * self._box.size**2
 
-    def iron(self, answer: Floats) -> int:
+    def flatten_folds(self, answer: Floats) -> int:
         """Lay flat what is folded in the answer (N, 3) that the last solve gave, in place.
 
         What goes on to the next frame is left as it is: see `solvers.deform.creases`.
@@ -277,12 +277,12 @@ class ArapSolver:
         Returns:
             How many triangles were folded.
         """
-        frame, order = self._frame, self._layout.order
+        box, order = self._box, self._layout.order
         self._from_rest[:] = self._shown
         with threads_for(len(order)):
-            folded = self._made_creases().iron(self._from_rest, self._R)
+            folded = self._made_creases().flatten_folds(self._from_rest, self._R)
         if folded:
-            place_outside(self._from_rest, order, frame.centre, frame.size, answer)
+            place_outside(self._from_rest, order, box.centre, box.size, answer)
         return folded
 
     def _made_creases(self) -> Creases:

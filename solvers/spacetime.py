@@ -57,14 +57,14 @@ class Constraint:
     axes: tuple[int, ...]
 
 
-def held_at(
+def position_constraint(
     frame: int, joint: int, position: Sequence[float], axes: Sequence[int] = (0, 1, 2)
 ) -> Constraint:
     """A control point is at `position`, one number for each of `axes` (equation 22)."""
     return Constraint(((frame, joint, 1.0),), tuple(map(float, position)), tuple(axes))
 
 
-def moving_by(
+def velocity_constraint(
     frame: int, joint: int, velocity: Sequence[float], axes: Sequence[int] = (0, 1, 2)
 ) -> Constraint:
     """A control point moves by `velocity` from the frame before to this one (equation 23)."""
@@ -72,7 +72,9 @@ def moving_by(
     return Constraint(terms, tuple(map(float, velocity)), tuple(axes))
 
 
-def level_with(frame: int, joint: int, other: int, axes: Sequence[int] = (1,)) -> Constraint:
+def equality_constraint(
+    frame: int, joint: int, other: int, axes: Sequence[int] = (1,)
+) -> Constraint:
     """Two control points agree on `axes`, as where one takes over the ground from another."""
     terms = (frame, joint, 1.0), (frame, other, -1.0)
     return Constraint(terms, (0.0,) * len(axes), tuple(axes))

@@ -31,7 +31,7 @@ from numpy.typing import ArrayLike
 from solvers.arap import ArapSolver
 from solvers.deform.arap_cells import SPOKES
 from solvers.deform.cell_planes import cell_planes, vertex_normals
-from solvers.deform.closed_shells import build_shell
+from solvers.deform.closed_shells import build_shells
 from solvers.deform.solver_state import DeformationState
 from solvers.deform.squash_kernels import (
     Fit,
@@ -93,7 +93,7 @@ class SquashStretchSolver(ArapSolver):
         self._planes = cell_planes(
             self._VR.reshape(-1, 3, 3), vertex_normals(self._rest, self._layout.faces)
         )
-        self._shell = build_shell(self._rest, self._layout.faces, self._layout.parts)
+        self._shell = build_shells(self._rest, self._layout.faces, self._layout.parts)
         parts = int(self._layout.parts.max()) + 1
         self._strains = np.zeros(count)
         self._pose = self._rest.copy()
@@ -173,7 +173,7 @@ class SquashStretchSolver(ArapSolver):
         self._unscale()
         energy += self._priors.energy(self._R)
         self._R[:], self._cell_scales[:] = kept
-        return energy * self._frame.size**2
+        return energy * self._box.size**2
 
     def rotations(self) -> Floats:
         """How each vertex's cell was turned by the last iteration, without its scale, (N, 3, 3)."""

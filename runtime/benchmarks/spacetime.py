@@ -17,7 +17,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import spsolve
 
-from solvers.spacetime import ACCELERATION, Constraint, held_at, retarget_trajectories
+from solvers.spacetime import ACCELERATION, Constraint, position_constraint, retarget_trajectories
 
 FRAMES = 3700
 JOINTS = 8
@@ -62,7 +62,9 @@ def _case(examples: int, frames: int) -> tuple[Array, Array, Array]:
 
 def _steps(frames: int) -> list[Constraint]:
     """Return one constraint a frame: two control points stand on the ground in turn."""
-    return [held_at(frame, frame // _STEP % 2, (0.0,), axes=(1,)) for frame in range(frames)]
+    return [
+        position_constraint(frame, frame // _STEP % 2, (0.0,), axes=(1,)) for frame in range(frames)
+    ]
 
 
 def _general(joints: Array, controls: Array, path: Array) -> Array:

@@ -19,7 +19,7 @@ from runtime.driving.performer import Performer, Pose, Rest, rest_state
 from runtime.driving.polyline_driver import PolylineDriver
 from runtime.driving.puppet_match import Choices, PuppetMatch, PuppetMatchState
 from runtime.puppet.puppet import Puppet
-from solvers.retarget.posture import most_different
+from solvers.retarget.limb_shapes import most_different_poses
 from solvers.retarget.source_limbs import simplify
 
 LEAST_SEEN = 0.5  # share of the driving joints that must be in view to strike a pose
@@ -145,7 +145,7 @@ class MatchSession:
             match.rehearse(clip, states, view)
         self.matching = False
         facing = np.array([pose.facing(0.0) - pose.hips for pose in poses])
-        tried = [poses[index] for index in most_different(facing, TRIED)]
+        tried = [poses[index] for index in most_different_poses(facing, TRIED)]
         return np.array([match.try_out(tried) for match in self._matches])
 
     def direct(self, frame: SkeletonFrame) -> None:

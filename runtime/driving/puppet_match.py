@@ -17,8 +17,8 @@ from runtime.driving.polyline_driver import STRAIGHT_ON
 from runtime.driving.turn_limits import box_of, corners_of, limit_turns
 from runtime.puppet.puppet import Puppet
 from solvers.matching import SIZE_PREFERENCE, Match, TargetHierarchy
+from solvers.retarget.limb_shapes import shape_likeness
 from solvers.retarget.match_hysteresis import MatchHysteresis, MatchHysteresisState
-from solvers.retarget.posture import likeness
 from solvers.retarget.source_limbs import SimplifiedSource
 
 CANDIDATES = 20  # matches that can be cycled through
@@ -278,7 +278,7 @@ class PuppetMatch:
         """How well a rest state suits: the match's score plus the likeness of the limbs' shapes."""
         nodes = self.puppet.bound_skeleton.tree.positions
         shapes = sum(
-            likeness(
+            shape_likeness(
                 rest.positions[list(drive.source)], nodes[list(drive.target)], STRAIGHT_ON, view
             )
             for drive in mapping.drives

@@ -11,7 +11,7 @@ from runtime.characters.character import Character
 from runtime.characters.proxy import Proxy
 from runtime.driving.targets import HandleGroups, HandleTargets, PosedNodes, Targets
 from solvers.deform.handles import HARD, group_targets, stretched_turns
-from solvers.deform.stiff_segments import Articulation, articulate
+from solvers.deform.stiff_segments import StiffSegments, find_stiff_segments
 from solvers.retarget.abstraction import abstract
 from solvers.skeleton.anchors import bind
 from solvers.skeleton.tree import Tree
@@ -108,9 +108,9 @@ class BoundSkeleton:
             start += 1
         return chain[start:]
 
-    def stiff_segments(self) -> Articulation:
+    def stiff_segments(self) -> StiffSegments:
         """Find the segments of the surface that can be stiff. It takes as long as a few frames."""
-        return articulate(
+        return find_stiff_segments(
             self._proxy.vertices,
             self._proxy.faces,
             self.tree.parents,

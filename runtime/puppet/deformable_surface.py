@@ -13,7 +13,7 @@ from runtime.driving.targets import HandleGroups, HandleTargets
 from solvers.deform.arap_cells import SPOKES
 from solvers.deform.handles import HARD
 from solvers.deform.solver_state import DeformationState
-from solvers.deform.stiff_segments import Articulation
+from solvers.deform.stiff_segments import StiffSegments
 from solvers.squash_stretch import SquashStretchSolver
 from solvers.surface.edges import Edges
 
@@ -75,7 +75,7 @@ class DeformableSurface:
         self,
         proxy: Proxy,
         handles: HandleGroups,
-        stiff_segments: Callable[[], Articulation],
+        stiff_segments: Callable[[], StiffSegments],
         *,
         energy: str = SPOKES,
     ) -> None:
@@ -134,7 +134,7 @@ class DeformableSurface:
         """
         self.hold(targets)
         self._solver.solve(targets.positions, iterations, out=self._answer)
-        self._solver.iron(self._answer)
+        self._solver.flatten_folds(self._answer)
         return self._answer
 
     def hold(self, targets: HandleTargets) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from runtime.driving.targets import Placement, PosedNodes
-from solvers.retarget.ground_contact import stand, turned_rotations
+from solvers.retarget.ground_contact import place_on_floor, turned_rotations
 from solvers.retarget.heading import turned
 
 Array = NDArray[np.float64]
@@ -48,7 +48,7 @@ def put_on_stage(vertices: Array, placement: Placement, about: Array, out: Array
         out: where they are put; not `vertices` itself.
     """
     x, z = placement.travel
-    rise = stand(vertices, placement.turn, about, placement.lift, out)
+    rise = place_on_floor(vertices, placement.turn, about, placement.lift, out)
     if x != 0.0 or z != 0.0:
         out += (x, 0.0, z)
     return Stance(placement.turn, about, np.array([x, rise, z]))

@@ -21,14 +21,14 @@ _FARTHEST = 1e9  # the farthest target, in sizes of the mesh; keeps every square
 
 
 @dataclass(frozen=True, slots=True)
-class Frame:
+class UnitBox:
     """A centre (3,) and a size: inside coordinates are about one, whatever the mesh's unit is."""
 
     centre: Floats
     size: float
 
     @classmethod
-    def around(cls, points: Floats) -> Frame:
+    def around(cls, points: Floats) -> UnitBox:
         """The frame of a point set's bounding box; a set that is one point has size one."""
         low, high = points.min(axis=0), points.max(axis=0)
         size = float(np.linalg.norm(high - low))
@@ -85,13 +85,13 @@ def checked_regions(region_of: ArrayLike, rigidity: ArrayLike, count: int) -> tu
     return regions, shares
 
 
-def checked_targets(targets: ArrayLike, count: int, frame: Frame) -> Floats:
+def checked_targets(targets: ArrayLike, count: int, box: UnitBox) -> Floats:
     """Targets (H, 3), or a ValueError that says what is wrong with them."""
     points = np.asarray(targets, dtype=np.float64)
     if points.shape != (count, 3):
         raise ValueError(f"expected targets of shape ({count}, 3), got {points.shape}")
     points = np.ascontiguousarray(points)
-    bad = _first_beyond(points, frame.centre, _FARTHEST * frame.size)
+    bad = _first_beyond(points, box.centre, _FARTHEST * box.size)
     if bad >= 0:
         raise ValueError(f"target {bad} is not finite, or absurdly far away: {points[bad]}")
     return points

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from solvers.deform.volume_kernels import Shell
+from solvers.deform.volume_kernels import ClosedShells
 from solvers.linear.laplacian import Floats, Ints
 
 _CHUNK = 512  # faces that are summed in one go
 
 
-def build_shell(vertices: Floats, faces: Ints, part_of: Ints) -> Shell:
+def build_shells(vertices: Floats, faces: Ints, part_of: Ints) -> ClosedShells:
     """The shell of a mesh (N, 3), (F, 3), whose vertices belong to components (N,)."""
     count = len(vertices)
     proper = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
@@ -24,7 +24,7 @@ def build_shell(vertices: Floats, faces: Ints, part_of: Ints) -> Shell:
     chunks, parts = _chunks(part_of[whole[:, 0]])
     first_of = np.searchsorted(parts, parts)  # each component's first chunk
     corners, pairs = _around(proper, count)
-    return Shell(
+    return ClosedShells(
         faces=whole.astype(np.uint32),
         areas=areas,
         chunks=chunks,

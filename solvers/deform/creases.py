@@ -91,7 +91,7 @@ class Creases:
         """Go back to a snapshot of the same surface."""
         self._folded[:], self._part = state.folded, state.part
 
-    def iron(self, x: Floats, R: Floats) -> int:
+    def flatten_folds(self, x: Floats, R: Floats) -> int:
         """Lay flat in x (N, 3) what is folded under cell turns R (N, 9), handles or not.
 
         Returns:

@@ -38,7 +38,7 @@ Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Articulation:
+class StiffSegments:
     """The segments of a surface of N vertices.
 
     Attributes:
@@ -50,14 +50,14 @@ class Articulation:
     rigidity: Array
 
 
-def articulate(  # noqa: PLR0917
+def find_stiff_segments(  # noqa: PLR0917
     vertices: Array,
     faces: Indices,
     parents: Indices,
     positions: Array,
     inside: NDArray[np.bool_],
     bone_of_vertex: Indices | None = None,
-) -> Articulation:
+) -> StiffSegments:
     """Cut a surface into segments along its skeleton.
 
     Args:
@@ -80,7 +80,7 @@ def articulate(  # noqa: PLR0917
     region_of = _without_fragments(region_of, graph, vertices, faces)
     rigidity = _rigidity(region_of, segments.radius, graph, vertices)
     _, region_of = np.unique(region_of, return_inverse=True)
-    return Articulation(region_of.astype(np.int64), rigidity)
+    return StiffSegments(region_of.astype(np.int64), rigidity)
 
 
 class _Segments(NamedTuple):

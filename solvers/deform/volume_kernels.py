@@ -24,7 +24,7 @@ _MOST = 3.0
 _TINY = 1e-300
 
 
-class Shell(NamedTuple):
+class ClosedShells(NamedTuple):
     """The closed surfaces whose volumes are kept; a named tuple, because kernels take one as it is.
 
     Faces (F, 3) lie component by component, with fans over holes, which have no area; chunk c is
@@ -50,7 +50,9 @@ def strain_cells(scales: Floats, out: Floats) -> None:
 
 
 @parallel_kernel
-def push(x: Floats, shell: Shell, strains: Floats, fixed: NDArray[np.bool_], out: Floats) -> None:
+def push(
+    x: Floats, shell: ClosedShells, strains: Floats, fixed: NDArray[np.bool_], out: Floats
+) -> None:
     """How a pressure pushes the vertices, out (N, 3): area vectors times the strain of their cells.
 
     An area vector is the gradient of the volume. Fixed vertices are not pushed.
@@ -74,7 +76,7 @@ def push(x: Floats, shell: Shell, strains: Floats, fixed: NDArray[np.bool_], out
 
 
 @parallel_kernel
-def volume_terms(x: Floats, g: Floats, shell: Shell, strains: Floats, out: Floats) -> None:
+def volume_terms(x: Floats, g: Floats, shell: ClosedShells, strains: Floats, out: Floats) -> None:
     """What each chunk of the shell adds to its component's volume, out (chunks, 5).
 
     Columns 0 to 3 are the volume of x + m g as a polynomial in m, constant first; 4 the strains of

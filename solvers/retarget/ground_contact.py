@@ -13,7 +13,7 @@ from solvers.kernels.quaternion import multiply
 Array = NDArray[np.float64]
 
 
-def stand(points: Array, angle: float, about: Array, lift: float, out: Array) -> float:
+def place_on_floor(points: Array, angle: float, about: Array, lift: float, out: Array) -> float:
     """Put points (N, 3) [m], turned as by `heading.turned` and then lifted, into `out` (N, 3).
 
     Nothing may sink into the floor, y = 0: what pushes against it lifts the whole.
@@ -28,11 +28,11 @@ def stand(points: Array, angle: float, about: Array, lift: float, out: Array) ->
     Returns:
         How far they rise [m].
     """
-    return _stand(points, math.cos(angle), math.sin(angle), about, lift, out)
+    return _place_on_floor(points, math.cos(angle), math.sin(angle), about, lift, out)
 
 
 @kernel
-def _stand(  # noqa: PLR0917
+def _place_on_floor(  # noqa: PLR0917
     points: Array, cosine: float, sine: float, about: Array, lift: float, out: Array
 ) -> float:
     lowest = np.inf

@@ -9,7 +9,7 @@ import numpy as np
 _LOWEST, _DECADES, _BINS_A_DECADE = -12, 18, 50
 
 
-class EnergyHistogram:
+class StreamingMedian:
     """Counts numbers in bins that are each 4.7 % wide, from 1e-12 to 1e6.
 
     What is smaller counts as 0, what is larger or not a number as 1e6.

@@ -13,14 +13,14 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from replay.formats import read_recording
-from solvers.retarget.posture import most_different
+from solvers.retarget.limb_shapes import most_different_poses
 from solvers.spacetime import (
     ACCELERATION,
     Constraint,
-    held_at,
-    level_with,
-    moving_by,
+    equality_constraint,
+    position_constraint,
     retarget_trajectories,
+    velocity_constraint,
 )
 
 Array = NDArray[np.float64]
@@ -118,7 +118,10 @@ def test_it_solves_the_papers_system(acceleration: float) -> None:
 def test_it_solves_the_papers_system_with_constraints() -> None:
     joints, controls = examples(7, joints=1)
     path = wander(12, joints=1)
-    constraints = [held_at(3, 0, (0.1, 0.2, 0.3)), moving_by(8, 0, (0.0, 0.1), axes=(0, 2))]
+    constraints = [
+        position_constraint(3, 0, (0.1, 0.2, 0.3)),
+        velocity_constraint(8, 0, (0.0, 0.1), axes=(0, 2)),
+    ]
 
     def rows(paths: Array) -> Array:
         return np.vstack([paths[9:12], (paths[24:27] - paths[21:24])[[0, 2]]])
@@ -180,10 +183,10 @@ def test_constraints_are_met_exactly_and_change_little_elsewhere() -> None:
     path = wander(200, joints=3)
     there = controls[2, 0] + 0.1
     constraints = [
-        held_at(50, 0, there),
-        held_at(51, 0, there[1:2], axes=[1]),
-        moving_by(120, 1, (0.0, 0.0, 0.0)),
-        level_with(20, 0, 2),
+        position_constraint(50, 0, there),
+        position_constraint(51, 0, there[1:2], axes=[1]),
+        velocity_constraint(120, 1, (0.0, 0.0, 0.0)),
+        equality_constraint(20, 0, 2),
     ]
     free = retarget_trajectories(joints, controls, path)
     found = retarget_trajectories(joints, controls, path, constraints=constraints)
@@ -197,7 +200,7 @@ def test_constraints_are_met_exactly_and_change_little_elsewhere() -> None:
 
 def test_constraints_may_say_the_same_twice() -> None:
     joints, controls = examples(8)
-    twice = [held_at(3, 0, (0.1, 0.2, 0.3)), held_at(3, 0, (0.1, 0.2, 0.3))]
+    twice = [position_constraint(3, 0, (0.1, 0.2, 0.3)), position_constraint(3, 0, (0.1, 0.2, 0.3))]
     once = retarget_trajectories(joints, controls, wander(9), constraints=twice[:1])
     found = retarget_trajectories(joints, controls, wander(9), constraints=twice)
     np.testing.assert_allclose(found, once, atol=1e-8)
@@ -206,8 +209,8 @@ def test_constraints_may_say_the_same_twice() -> None:
 @pytest.mark.parametrize(
     "constraints",
     [
-        [held_at(3, 0, (0.0,), axes=[0]), held_at(3, 0, (1.0,), axes=[0])],
-        [held_at(3, 1, (0.0, 0.0, 0.1))],
+        [position_constraint(3, 0, (0.0,), axes=[0]), position_constraint(3, 0, (1.0,), axes=[0])],
+        [position_constraint(3, 1, (0.0, 0.0, 0.1))],
     ],
 )
 def test_what_cannot_be_met_is_told(constraints: list[Constraint]) -> None:
@@ -223,7 +226,7 @@ def test_short_paths_are_paths(frames: int) -> None:
     found = retarget_trajectories(joints, controls, wander(frames))
     assert found.shape == (frames, 2, 3)
     assert np.isfinite(found).all()
-    held = held_at(frames - 1, 1, (0.1, 0.2, 0.3))
+    held = position_constraint(frames - 1, 1, (0.1, 0.2, 0.3))
     met = retarget_trajectories(joints, controls, wander(frames), constraints=[held])
     np.testing.assert_allclose(met[-1, 1], held.value, atol=1e-9)
     np.testing.assert_array_equal(met[:, 0], found[:, 0])
@@ -246,12 +249,14 @@ def test_what_is_given_is_checked() -> None:
         ),
         (
             lambda: retarget_trajectories(
-                joints, controls, path, constraints=[moving_by(0, 0, (0.0, 0.0, 0.0))]
+                joints, controls, path, constraints=[velocity_constraint(0, 0, (0.0, 0.0, 0.0))]
             ),
             "constraint 0 names frame -1 of joint 0, but there are 9 frames of 2 joints",
         ),
         (
-            lambda: retarget_trajectories(joints, controls, path, constraints=[held_at(1, 1, ())]),
+            lambda: retarget_trajectories(
+                joints, controls, path, constraints=[position_constraint(1, 1, ())]
+            ),
             "a value for each of the axes",
         ),
         (
@@ -262,7 +267,7 @@ def test_what_is_given_is_checked() -> None:
         ),
         (
             lambda: retarget_trajectories(
-                joints, controls, path, constraints=[held_at(1, 1, (), axes=())]
+                joints, controls, path, constraints=[position_constraint(1, 1, (), axes=())]
             ),
             "at least one position and axis in constraint 0",
         ),
@@ -278,7 +283,7 @@ def test_a_real_dance_stays_within_reach_of_its_examples(shared: Path) -> None:
     names = [name.lower() for name in recording.skeleton.names]
     ends = [k for k, name in enumerate(names) if name in ("lhand", "rhand", "lfoot", "rfoot")]
     path = (poses - poses[:, :1])[:, ends]
-    chosen = most_different(path, 8)
+    chosen = most_different_poses(path, 8)
     controls = path[chosen] * [0.5, 1.5, 0.3]
     controls += np.random.default_rng(0).normal(scale=0.05, size=controls.shape)
     found = retarget_trajectories(path[chosen], controls, path)

@@ -14,7 +14,7 @@ from solvers.deform.rotation_fit import SCRATCH
 from solvers.kernels.compiled import kernel, most_threads, threads_for
 from solvers.linear.laplacian import half_cotangents
 from solvers.signal.histogram import count, percentile
-from solvers.signal.streaming_median import EnergyHistogram
+from solvers.signal.streaming_median import StreamingMedian
 
 EACH_FRAME = 4_000  # vertices; a larger surface is looked at every so many frames
 SLIVER = 0.02  # height over longest side: the normal of a flatter triangle is noise
@@ -80,7 +80,7 @@ class Watchdog:
         self._counts = np.zeros(_BINS, np.int64)
         self._stride = max(1, -(-len(rest) // EACH_FRAME))
         self._frames = self._looks = self._bad_looks = 0
-        self._energies = EnergyHistogram()
+        self._energies = StreamingMedian()
         self._worst = Finding(0.0, 0.0, 0.0, 0, 0)
         self.last: Finding | None = None
         self._look(rest, np.zeros(0))  # compiles now, or loads what an earlier run compiled

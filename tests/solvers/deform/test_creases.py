@@ -48,7 +48,7 @@ def test_a_vertex_pushed_over_its_neighbours_comes_back_between_them(angle: floa
     assert folded(before, turn) > 0
     for _ in range(PARTS):  # a part of the triangles in each frame
         x[:] = before
-        known = creases.iron(x, R)
+        known = creases.flatten_folds(x, R)
     assert known == folded(before, turn)
     assert folded(x, turn) == 0
     moved = np.flatnonzero(np.abs(x - before).max(axis=1) > 0.0)
@@ -60,7 +60,7 @@ def test_what_is_not_folded_is_not_touched():
     solver = ArapSolver(POINTS, FACES, CORNERS)
     answer = solver.solve(POINTS[CORNERS] * [1.2, 0.9, 1.0], 3)
     before = answer.copy()
-    assert solver.iron(answer) == 0
+    assert solver.flatten_folds(answer) == 0
     np.testing.assert_array_equal(answer, before)
 
 
@@ -70,12 +70,12 @@ def test_a_solver_irons_what_it_shows_and_goes_on_from_what_it_had():
     away = np.zeros((6, 3))
     away[4:, 0] = 5.0, -5.0
     flat = Rotation.identity()
-    ironed, plain = (ArapSolver(POINTS, FACES, held) for _ in range(2))
+    flattened, plain = (ArapSolver(POINTS, FACES, held) for _ in range(2))
     for _ in range(2 * PARTS):
-        shown, folds = ironed.solve(POINTS[held] + away, 2), plain.solve(POINTS[held] + away, 2)
-        ironed.iron(shown)
+        shown, folds = flattened.solve(POINTS[held] + away, 2), plain.solve(POINTS[held] + away, 2)
+        flattened.flatten_folds(shown)
     assert folded(folds, flat) > 0
     assert folded(shown, flat) == 0
     np.testing.assert_array_equal(
-        ironed.solve(POINTS[held] + away, 2), plain.solve(POINTS[held] + away, 2)
+        flattened.solve(POINTS[held] + away, 2), plain.solve(POINTS[held] + away, 2)
     )

@@ -83,7 +83,7 @@ class Performance:
         goals = np.where(groups[:, None] % 2 == 0, BOTH[held], turn.apply(BOTH[held]) + step.path)
         answer = solver.solve(goals, step.iterations)
         flat = answer.copy()
-        folded = solver.iron(flat)
+        folded = solver.flatten_folds(flat)
         said = [answer, flat, np.array(folded), np.array(solver.energy), solver.rotations()]
         solver.settle(step.settled)
         return said

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solvers.deform.stiff_segments import Articulation, articulate
+from solvers.deform.stiff_segments import StiffSegments, find_stiff_segments
 from tests.solvers.bars import bar
 
 
@@ -21,12 +21,12 @@ def chain(points: np.ndarray) -> np.ndarray:
     return np.arange(len(points)) - 1
 
 
-def cut(points: np.ndarray, vertices: np.ndarray, faces: np.ndarray) -> Articulation:
+def cut(points: np.ndarray, vertices: np.ndarray, faces: np.ndarray) -> StiffSegments:
     inside = np.zeros(len(points), dtype=bool)
-    return articulate(vertices, faces, chain(points), points, inside)
+    return find_stiff_segments(vertices, faces, chain(points), points, inside)
 
 
-def borders(articulation: Articulation, vertices: np.ndarray) -> list[float]:
+def borders(articulation: StiffSegments, vertices: np.ndarray) -> list[float]:
     """Where along x one region ends and the next begins."""
     order = np.argsort(vertices[:, 0], kind="stable")
     region, x = articulation.region_of[order], vertices[order, 0]
@@ -88,7 +88,9 @@ def test_short_bones_inside_the_body_are_one_trunk() -> None:
             parents.append(0 if step == 0 else len(nodes) - 1)
             nodes.append((np.array([2.0, 0, 0]) + reach * direction).tolist())
             inside.append(step == 0)
-    found = articulate(points, triangles, np.array(parents), np.array(nodes), np.array(inside))
+    found = find_stiff_segments(
+        points, triangles, np.array(parents), np.array(nodes), np.array(inside)
+    )
     reach = np.linalg.norm(points - [2.0, 0, 0], axis=1)
     trunk = np.unique(found.region_of[reach < 0.5])
     assert len(trunk) == 1
@@ -105,7 +107,7 @@ def test_what_a_rig_says_goes_before_what_is_near() -> None:
     nodes = along_x(-0.1, 2.0, 4.1)
     bone = np.where(vertices[:, 0] > 3.0, 2, 1)
     inside = np.zeros(3, dtype=bool)
-    found = articulate(vertices, faces, chain(nodes), nodes, inside, bone)
+    found = find_stiff_segments(vertices, faces, chain(nodes), nodes, inside, bone)
     assert borders(found, vertices) == pytest.approx([3.0], abs=0.11)
 
 
@@ -115,19 +117,19 @@ def test_a_stray_patch_joins_what_it_lies_in() -> None:
     bone = np.where(vertices[:, 0] > 2.0, 2, 1)
     bone[np.linalg.norm(vertices - [3.2, 0.5, 0.0], axis=1) < 0.25] = 1
     inside = np.zeros(3, dtype=bool)
-    found = articulate(vertices, faces, chain(nodes), nodes, inside, bone)
+    found = find_stiff_segments(vertices, faces, chain(nodes), nodes, inside, bone)
     assert len(np.unique(found.region_of[vertices[:, 0] > 2.1])) == 1
 
 
 def test_one_node_or_no_face_is_one_region() -> None:
     vertices, faces = bar()
     root = np.array([-1])
-    found = articulate(vertices, faces, root, np.zeros((1, 3)), np.zeros(1, dtype=bool))
+    found = find_stiff_segments(vertices, faces, root, np.zeros((1, 3)), np.zeros(1, dtype=bool))
     assert (found.region_of == 0).all()
     assert (found.rigidity == 1.0).all()
     nothing = np.zeros((0, 3), dtype=np.int64)
     nodes = along_x(-0.1, 2.0, 4.1)
-    loose = articulate(vertices, nothing, chain(nodes), nodes, np.zeros(3, dtype=bool))
+    loose = find_stiff_segments(vertices, nothing, chain(nodes), nodes, np.zeros(3, dtype=bool))
     assert loose.region_of.max() == 1
     assert (loose.rigidity == 1.0).all()
 

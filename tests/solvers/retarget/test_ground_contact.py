@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from solvers.retarget.ground_contact import stand, turned_rotations
+from solvers.retarget.ground_contact import place_on_floor, turned_rotations
 from solvers.retarget.heading import turned
 
 POINTS = np.random.default_rng(0).normal(size=(50, 3))
@@ -20,14 +20,14 @@ ABOUT = np.array([0.3, 0.7, -0.2])
 )
 def test_it_rises_as_far_as_it_is_lifted_or_the_floor_pushes(lift: float, rise: float) -> None:
     out = np.empty_like(POINTS)
-    assert stand(POINTS, 0.8, ABOUT, lift, out) == rise
+    assert place_on_floor(POINTS, 0.8, ABOUT, lift, out) == rise
     np.testing.assert_allclose(out, turned(POINTS, 0.8, ABOUT) + UP * rise, atol=1e-14)
     assert out[:, 1].min() >= 0.0
 
 
 def test_it_turns_as_a_rotation_about_the_vertical_does() -> None:
     whole, out = Rotation.from_rotvec([0.0, -2.1, 0.0]), np.empty_like(POINTS)
-    stand(POINTS, -2.1, ABOUT, 9.0, out)
+    place_on_floor(POINTS, -2.1, ABOUT, 9.0, out)
     expected = whole.apply(POINTS - ABOUT) + ABOUT + UP * 9.0
     np.testing.assert_allclose(out, expected, atol=1e-14)
     own = Rotation.random(5, random_state=2)

@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from solvers.signal.association import LOYALTY, STRANGER, associate
+from solvers.signal.association import KNOWN_NAME_BONUS, NEW_COST, associate
 
 
 def test_nobody_is_somebody_new() -> None:
@@ -30,8 +30,8 @@ def test_what_is_too_far_is_new_unless_it_bears_the_name() -> None:
 
 def test_a_name_outweighs_a_little_distance_only() -> None:
     same, within = np.array([[True, False]]), np.array([[True, True]])
-    assert associate(np.array([[0.9 * LOYALTY, 0.0]]), same, within).tolist() == [0]
-    assert associate(np.array([[1.1 * LOYALTY, 0.0]]), same, within).tolist() == [1]
+    assert associate(np.array([[0.9 * KNOWN_NAME_BONUS, 0.0]]), same, within).tolist() == [0]
+    assert associate(np.array([[1.1 * KNOWN_NAME_BONUS, 0.0]]), same, within).tolist() == [1]
 
 
 @settings(max_examples=60, deadline=None)
@@ -44,7 +44,7 @@ def test_no_other_assignment_costs_less(detections: int, known: int, seed: int) 
 
     def cost(answer: tuple[int, ...]) -> float:
         return sum(
-            STRANGER if k < 0 else distance[d, k] if within[d, k] else 1e6
+            NEW_COST if k < 0 else distance[d, k] if within[d, k] else 1e6
             for d, k in enumerate(answer)
         )
 

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from runtime.output.report import watchdog
 from runtime.output.report.report import Report
 from runtime.output.report.watchdog import Finding, Watchdog
-from solvers.signal.streaming_median import EnergyHistogram
+from solvers.signal.streaming_median import StreamingMedian
 from solvers.surface.edges import Edges
 from tests.runtime.tentacle import make_show, make_tentacle
 
@@ -170,7 +170,7 @@ def test_what_tears_is_infinite() -> None:
 
 @given(values=st.lists(st.floats(1e-9, 1e3), min_size=1, max_size=40))
 def test_the_median_is_near(values: list[float]) -> None:
-    histogram = EnergyHistogram()
+    histogram = StreamingMedian()
     for value in values:
         histogram.add(value)
     lower = np.percentile(values, 50, method="inverted_cdf")
@@ -178,8 +178,8 @@ def test_the_median_is_near(values: list[float]) -> None:
 
 
 def test_the_median_of_nothing_and_of_what_no_bin_holds() -> None:
-    assert EnergyHistogram().median == 0.0
-    histogram = EnergyHistogram()
+    assert StreamingMedian().median == 0.0
+    histogram = StreamingMedian()
     histogram.add(0.0)
     assert histogram.median == 0.0
     for value in (np.inf, np.nan, 1e300):

@@ -15,7 +15,7 @@ SAMPLES = (np.arange(8) + 0.5) / 8.0  # of the unit arc length
 Array = NDArray[np.float64]
 
 
-def likeness(source: Array, target: Array, source_view: Array, target_view: Array) -> float:
+def shape_likeness(source: Array, target: Array, source_view: Array, target_view: Array) -> float:
     """Mean cosine between the directions of two polylines on the screen, in [-1, 1].
 
     Args:
@@ -29,7 +29,7 @@ def likeness(source: Array, target: Array, source_view: Array, target_view: Arra
     return float((ours * theirs).sum(axis=1).mean())
 
 
-def most_different(poses: Array, wanted: int) -> NDArray[np.int64]:
+def most_different_poses(poses: Array, wanted: int) -> NDArray[np.int64]:
     """Indices, rising, of poses far from each other: the extremes of a motion come first.
 
     Args:
