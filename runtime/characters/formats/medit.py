@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from runtime.characters.formats.mesh_data import FileMesh, MeshError, check_counts
+from runtime.characters.formats.polygons import cut_polygons
 
 _CORNERS = {"triangles": 3, "quadrilaterals": 4, "tetrahedra": 4}
 
@@ -25,14 +26,14 @@ def read_medit(content: bytes) -> FileMesh:
         raise MeshError("it does not begin with MeshVersionFormatted: no MEDIT mesh")
     blocks = {name: _block(words, name, width) for name, width in _CORNERS.items()}
     vertices = _block(words, "vertices", 3)
-    quads = blocks["quadrilaterals"].astype(np.int64)
-    faces = np.vstack(
-        [blocks["triangles"].astype(np.int64), quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]
-    )
+    quads = blocks["quadrilaterals"].astype(np.int64).reshape(-1)
+    cut, notes = cut_polygons(vertices, quads - 1, np.full(len(quads) // 4, 4))
+    halves = quads[cut.corners].reshape(-1, 2, 3)
+    faces = np.vstack([blocks["triangles"].astype(np.int64), halves[:, 0], halves[:, 1]])
     if len(faces) == 0:
         faces = _boundary(blocks["tetrahedra"].astype(np.int64))
     check_counts(len(vertices), len(faces))
-    return FileMesh(vertices, faces - 1)
+    return FileMesh(vertices, faces - 1, notes=notes)
 
 
 def _block(words: list[str], keyword: str, width: int) -> NDArray[np.float64]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -46,11 +45,6 @@ class FileMesh:
     notes: tuple[str, ...] = ()
 
 
-def fan(corners: Sequence[int]) -> list[tuple[int, int, int]]:
-    """The triangles of a polygon, fanned from its first corner."""
-    return [(corners[0], corners[i], corners[i + 1]) for i in range(1, len(corners) - 1)]
-
-
 def check_counts(vertices: int, faces: int) -> None:
     """Refuse counts that no file may declare.
 
@@ -65,4 +59,16 @@ def check_counts(vertices: int, faces: int) -> None:
         raise MeshError(
             f"it has {vertices} vertices and {faces} faces, more than {MOST_VERTICES} and "
             f"{MOST_FACES}; reduce it first"
+        )
+
+
+def check_indices(indices: NDArray[np.int64], vertices: int) -> None:
+    """Refuse indices that are not among so many vertices.
+
+    Raises:
+        MeshError: one is not.
+    """
+    if indices.size and not 0 <= indices.min() <= indices.max() < vertices:
+        raise MeshError(
+            f"a face names a vertex that is not among the {vertices}; it is cut short or damaged"
         )

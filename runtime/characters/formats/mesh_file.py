@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from devices.errors import InputError
 from runtime.characters.formats.medit import read_medit
-from runtime.characters.formats.mesh_data import FileMesh, MeshError, check_counts
+from runtime.characters.formats.mesh_data import FileMesh, MeshError, check_counts, check_indices
 from runtime.characters.formats.obj import read_obj
 from runtime.characters.formats.off import read_off
 from runtime.characters.formats.ply import read_ply
@@ -76,11 +76,7 @@ def checked(mesh: FileMesh) -> FileMesh:
         MeshError: it has no faces, too many, none with an extent, or names what is not there.
     """
     check_counts(len(mesh.vertices), len(mesh.faces))
-    if mesh.faces.min() < 0 or mesh.faces.max() >= len(mesh.vertices):
-        raise MeshError(
-            f"a face names a vertex that is not among the {len(mesh.vertices)}; "
-            "it is cut short or damaged"
-        )
+    check_indices(mesh.faces, len(mesh.vertices))
     used = mesh.vertices[mesh.faces]
     if not np.isfinite(mesh.vertices).all():
         bad = int(np.flatnonzero(~np.isfinite(mesh.vertices).all(axis=1))[0])

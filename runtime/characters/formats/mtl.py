@@ -12,6 +12,7 @@ from PIL import Image, UnidentifiedImageError
 from runtime.characters.character import Material
 from runtime.characters.palette import linear_from_srgb
 
+_FORMATS = ("PNG", "JPEG", "WEBP")  # Pillow's other decoders are less tested; EPS runs a program
 MOST_BYTES = 4 << 20
 MOST_TEXTURE_BYTES = 256 << 20
 MOST_TEXELS = 8192 * 8192
@@ -20,27 +21,25 @@ TEXTURE_SIZE = 2048
 
 
 def read_mtl(path: Path) -> tuple[dict[str, Material], list[str]]:
-    """The materials by name and notes; a missing or damaged library gives none, never an error.
+    """The materials by name, and notes; a missing or damaged library gives none, never an error.
 
-    `Kd` is taken as sRGB and replaced by white under a `map_Kd`, which most exporters mean.
+    `Kd` is taken as sRGB and replaced by white under a `map_Kd`, which most exporters mean. A name
+    is all that stands behind `newmtl`, `#` included.
     """
     try:
         if not path.is_file():
             raise FileNotFoundError(path)
         with path.open("rb") as file:
-            text = file.read(MOST_BYTES).decode("utf-8", errors="replace")
+            text = file.read(MOST_BYTES).decode("utf-8-sig", errors="replace")
     except (OSError, ValueError):  # ValueError: a name that no file can have
         return {}, [f"material library {path.name!r} cannot be read: default colours"]
-    settings: dict[str, dict[str, str]] = {}
-    current: dict[str, str] = {}
-    for line in text.splitlines():
-        keyword, _, value = line.split("#", 1)[0].strip().partition(" ")
-        if keyword == "newmtl":
-            current = settings.setdefault(value.strip(), {})
-        elif keyword in {"Kd", "d", "Tr", "map_Kd"}:
-            current[keyword] = value.strip()
-    materials: dict[str, Material] = {}
+    settings = _settings(text)
     notes: list[str] = []
+    if settings and all(_numbers(said.get("Tr", ""))[:1] == [1.0] for said in settings.values()):
+        notes.append(f"Tr is 1 on every material of {path.name!r}: taken as opaque")
+        for said in settings.values():
+            said["d"] = "1"
+    materials: dict[str, Material] = {}
     for name, said in settings.items():
         texture = None
         if "map_Kd" in said:
@@ -50,7 +49,22 @@ def read_mtl(path: Path) -> tuple[dict[str, Material], list[str]]:
     return materials, notes
 
 
+def _settings(text: str) -> dict[str, dict[str, str]]:
+    """The words behind the keywords that are read, for each material by name."""
+    settings: dict[str, dict[str, str]] = {}
+    current: dict[str, str] = {}
+    for line in text.splitlines():
+        keyword, *rest = line.split(None, 1)[:2] or [""]
+        value = rest[0].strip() if rest else ""
+        if keyword == "newmtl":
+            current = settings.setdefault(" ".join(value.split()), {})
+        elif keyword in {"Kd", "d", "Tr", "map_Kd"}:
+            current[keyword] = value.partition("#")[0].strip()
+    return settings
+
+
 def _color(said: dict[str, str], *, textured: bool) -> NDArray[np.float32]:
+    """Linear RGBA (4,) from `Kd` and `d`, or `Tr`, which is 1 - d."""
     alpha = _numbers(said.get("d", ""))[:1] or [1.0 - x for x in _numbers(said.get("Tr", ""))[:1]]
     rgb = _numbers(said.get("Kd", ""))[:3]
     if textured or len(rgb) != 3:
@@ -68,19 +82,31 @@ def _numbers(text: str) -> list[float]:
 
 
 def _texture(folder: Path, value: str) -> tuple[NDArray[np.uint8] | None, str]:
-    """The image (h, w, 4) that a map_Kd line names, and a note where there is none."""
-    name = value.rsplit(maxsplit=1)[-1] if value.startswith("-") else value  # after options
+    """The picture (h, w, 4) that a `map_Kd` line names, and a note where there is none."""
+    name = value.rsplit(maxsplit=1)[-1] if value.startswith("-") else value  # behind options
     path = folder / name.replace("\\", "/")
+    fault = ""
     try:
-        if not path.is_file():
-            return None, f"texture {path.name!r} is not there: default colours"
-        if path.stat().st_size > MOST_TEXTURE_BYTES:
-            return None, f"texture {path.name!r} is too large: left out"
-        with warnings.catch_warnings(), Image.open(path) as image:
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)
-            if image.width * image.height > MOST_TEXELS:
-                return None, f"texture {path.name!r} is too large: left out"
-            image.thumbnail((TEXTURE_SIZE, TEXTURE_SIZE))
-            return np.array(image.convert("RGBA"), dtype=np.uint8), ""
+        if not path.resolve().is_relative_to(folder.resolve()):
+            fault = "is outside the character's folder: default colours"
+        elif not path.is_file():
+            fault = "is not there: default colours"
+        elif path.stat().st_size > MOST_TEXTURE_BYTES:
+            fault = "is too large: left out"
+        else:
+            return _picture(path), ""
+    except Image.DecompressionBombError:
+        fault = "is too large: left out"
     except (OSError, ValueError, SyntaxError, UnidentifiedImageError):
-        return None, f"texture {path.name!r} is no image or damaged: default colours"
+        fault = "is no PNG, JPEG or WebP, or is damaged: default colours"
+    return None, f"texture {path.name!r} {fault}"
+
+
+def _picture(path: Path) -> NDArray[np.uint8]:
+    """The picture (h, w, 4) in a file, no larger than `TEXTURE_SIZE`."""
+    with warnings.catch_warnings(), Image.open(path, formats=_FORMATS) as image:
+        warnings.simplefilter("ignore")
+        if image.width * image.height > MOST_TEXELS:
+            raise Image.DecompressionBombError
+        image.thumbnail((TEXTURE_SIZE, TEXTURE_SIZE))
+        return np.array(image.convert("RGBA"), dtype=np.uint8)

@@ -7,14 +7,16 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
-from runtime.characters.formats.mesh_data import FileMesh, MeshError, check_counts, fan
+from runtime.characters.formats.mesh_data import FileMesh, MeshError, check_counts
+from runtime.characters.formats.polygons import cut_polygons
 from runtime.characters.palette import linear_from_srgb
 
 _KEYWORD = re.compile(r"(ST)?(C)?(N)?(4)?(n)?OFF\b", re.ASCII)
 
 
 def read_off(content: bytes) -> FileMesh:
-    """Read OFF, COFF, NOFF, CNOFF and STOFF; polygons are fanned into triangles, comments skipped.
+    """Read OFF, COFF, NOFF, CNOFF and STOFF; polygons are cut into triangles, comments
+    skipped.
 
     Colours of vertices are taken as sRGB, whole numbers to 255 or fractions to 1; colours of faces,
     normals and texture coordinates are left out.
@@ -43,8 +45,9 @@ def read_off(content: bytes) -> FileMesh:
     colors = None
     if colored and min(widths) >= skipped + 3:
         colors = _colors(_numbers(body[:count], min(*widths, skipped + 4))[:, skipped:])
-    faces = _faces(body[count : count + face_count])
-    return FileMesh(vertices, faces, colors)
+    corners, sizes = _polygons(body[count : count + face_count])
+    cut, notes = cut_polygons(vertices, corners, sizes)
+    return FileMesh(vertices, corners[cut.corners], colors, notes=notes)
 
 
 def _header(lines: list[list[str]]) -> tuple[bool, bool, int]:
@@ -84,14 +87,21 @@ def _colors(values: NDArray[np.float64]) -> NDArray[np.float32]:
     return linear_from_srgb(values / (255.0 if finite.size and finite.max() > 1.0 else 1.0))
 
 
-def _faces(rows: list[list[str]]) -> NDArray[np.int64]:
-    triangles: list[tuple[int, int, int]] = []
+def _polygons(rows: list[list[str]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """The vertices of all corners (C,), and how many corners each face has (P,)."""
+    corners: list[int] = []
+    sizes: list[int] = []
     for index, row in enumerate(rows):
         try:
-            corners = [int(word) for word in row[1 : 1 + int(row[0])]]
+            size = int(row[0])
+            polygon = [int(word) for word in row[1 : 1 + size]]
         except ValueError:
             raise MeshError(f"face {index} is not made of whole numbers; it is damaged") from None
-        if len(corners) != int(row[0]):
+        if len(polygon) != size:
             raise MeshError(f"face {index} has fewer corners than it says; it is damaged")
-        triangles += fan(corners)
-    return np.array(triangles, dtype=np.int64).reshape(-1, 3)
+        corners += polygon
+        sizes.append(size)
+    try:
+        return np.array(corners, dtype=np.int64), np.array(sizes, dtype=np.int64)
+    except OverflowError:
+        raise MeshError("a face names a vertex that no file has; it is damaged") from None

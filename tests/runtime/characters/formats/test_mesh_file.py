@@ -7,15 +7,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from PIL import Image
-from scipy.sparse import csr_array
 
 from devices.errors import InputError
 from runtime.characters.character_file import SUFFIXES, read_character
 from runtime.characters.formats.mesh_data import FileMesh
 from runtime.characters.formats.mesh_file import MESH_SUFFIXES, read_mesh_file
 from runtime.characters.palette import linear_from_srgb, palette_color
-from runtime.characters.weld import first_occurrences, weld, welded_weights
 
 TETRAHEDRON = np.array([[0.0, 0, 0], [2, 0, 0], [0, 3, 0], [0, 0, 1.5]])
 FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
@@ -200,70 +197,6 @@ def test_what_is_no_character_names_what_is(tmp_path: Path) -> None:
         read_character(tmp_path / "folder.obj")
 
 
-def test_obj_keeps_the_order_of_its_v_lines_and_reads_relative_corners(tmp_path: Path) -> None:
-    text = (
-        "v 0 0 0\nv 9 9 9\nv 1 0 0\nv 0 1 0\nv 1 1 0\nvt 0 0\nvt 1 0\n"
-        "f 1/1 3/2 5/1 4/2\nf -1// \\\n -2// -5//\no second\nf 1/1 2/2\n"
-    )
-    mesh = read_mesh_file(written(tmp_path, "a.obj", text))
-    np.testing.assert_array_equal(mesh.vertices[:3], [[0, 0, 0], [9, 9, 9], [1, 0, 0]])
-    np.testing.assert_array_equal(mesh.faces, [[0, 2, 4], [0, 4, 3], [4, 3, 0]])
-    assert mesh.uvs is None  # there is no texture that they would serve
-    assert mesh.notes == ("left out 1 faces of fewer than three corners",)
-
-
-def textured(folder: Path) -> Path:
-    Image.fromarray(np.full((2, 4, 3), 200, dtype=np.uint8)).save(folder / "skin map.png")
-    written(
-        folder,
-        "a.mtl",
-        "newmtl skin\nKd 0 0 0\nmap_Kd skin map.png\nnewmtl red\nKd 1 0 0\nd 0.5\n",
-    )
-    text = (
-        "mtllib a.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nvt .25 .75\n"
-        "usemtl skin\nf 1/1 2/2 3/3\nusemtl red\nf 2/4 4/2 3/3\n"
-    )
-    return written(folder, "a.obj", text)
-
-
-def test_obj_splits_what_a_uv_seam_splits_after_the_v_lines(tmp_path: Path) -> None:
-    character = read_character(textured(tmp_path))
-    surface = character.surface
-    assert surface.uvs is not None
-    np.testing.assert_array_equal(surface.vertex, [0, 1, 2, 3, 1])
-    np.testing.assert_array_equal(surface.faces, [[0, 1, 2], [4, 3, 2]])
-    np.testing.assert_array_equal(surface.vertex[surface.faces], character.faces)
-    np.testing.assert_allclose(
-        surface.uvs[surface.faces],
-        [[[0, 1], [1, 1], [0, 0]], [[0.25, 0.25], [1, 1], [0, 0]]],  # v downwards, as in glTF
-    )
-    skin, red = (surface.materials[i] for i in surface.face_material)
-    assert skin.texture is not None
-    assert skin.texture.shape == (2, 4, 4)
-    np.testing.assert_allclose(skin.color, 1.0)
-    np.testing.assert_allclose(red.color, [1, 0, 0, 0.5])
-    np.testing.assert_allclose(surface.colors, 1.0)
-
-
-@pytest.mark.parametrize("missing", ["a.mtl", "skin map.png"])
-def test_a_missing_material_or_texture_is_noted(missing: str, tmp_path: Path) -> None:
-    path = textured(tmp_path)
-    (tmp_path / missing).unlink()
-    character = read_character(path)
-    assert any(missing in note for note in character.notes)
-
-
-def test_a_damaged_texture_is_noted(tmp_path: Path) -> None:
-    path = textured(tmp_path)
-    (tmp_path / "skin map.png").write_bytes(b"no image")
-    assert any("skin map.png" in note for note in read_character(path).notes)
-
-
-def test_a_library_that_names_no_file_is_no_error(tmp_path: Path) -> None:
-    path = written(tmp_path, "a.obj", "mtllib\nmtllib /dev/null\0x\n" + as_obj())
-    assert len(read_mesh_file(path).faces) == 4
-
-
 @pytest.mark.parametrize(
     ("name", "text"),
     [
@@ -297,42 +230,6 @@ def test_tetrahedra_alone_show_their_boundary(tmp_path: Path) -> None:
     assert len(mesh.faces) == 6
     edges = np.sort(np.vstack([mesh.faces[:, [i, (i + 1) % 3]] for i in range(3)]), axis=1)
     assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()  # closed
-
-
-def test_welding_joins_seams_and_keeps_first_appearances() -> None:
-    points = np.array([[5.0, 0, 0], [0, 0, 0], [5, 0, 2e-8], [-0.0, 0, 0], [1, 1, 1]])
-    groups = weld(points)
-    np.testing.assert_array_equal(groups, [0, 1, 0, 1, 2])
-    np.testing.assert_array_equal(first_occurrences(groups), [0, 1, 4])
-
-
-def test_welding_keeps_fine_detail_apart() -> None:
-    points = np.array([[0.0, 0, 0], [1e-5, 0, 0], [1, 0, 0]])
-    assert len(np.unique(weld(points))) == 3
-
-
-@given(st.integers(0, 2**32 - 1), st.floats(-6, 6))
-@settings(max_examples=30, deadline=None)
-def test_welding_undoes_splitting_at_any_scale_and_order(seed: int, exponent: float) -> None:
-    random = np.random.default_rng(seed)
-    points = random.normal(size=(40, 3)) * 10.0**exponent
-    copies = random.integers(0, 40, size=150)
-    groups = weld(points[copies])
-    np.testing.assert_array_equal(
-        groups[:, None] == groups[None, :], copies[:, None] == copies[None, :]
-    )
-    assert (np.diff(first_occurrences(groups)) > 0).all()
-
-
-def test_weights_of_welded_vertices_are_the_mean_of_theirs() -> None:
-    weights = csr_array([[1.0, 0.0, 0.0], [0.0, 0.5, 0.5], [0.5, 0.5, 0.0]])
-    welded = welded_weights(weights, np.array([0, 1, 0]))
-    np.testing.assert_allclose(welded.toarray(), [[0.75, 0.25, 0.0], [0.0, 0.5, 0.5]])
-
-
-def test_many_vertices_in_one_spot_far_from_another_stay_cheap() -> None:
-    points = np.vstack([np.random.default_rng(0).normal(size=(20000, 3)), [[1e12, 0, 0]]])
-    assert weld(points).max() >= 1
 
 
 def test_a_loaded_character_keeps_its_promises(tmp_path: Path) -> None:
