@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from enum import StrEnum
@@ -100,18 +100,22 @@ def check_kind(address: str) -> None:
         raise InputError(f"cannot open {address!r}: no such kind of device; there are: {known}")
 
 
-def watch(addresses: Sequence[str], seconds: float) -> list[Watch]:
-    """Listen at all addresses at once for `seconds` [s]; one result for each, in their order."""
+def watch(
+    addresses: Sequence[str], seconds: float, *, clock: Callable[[], float] = time.perf_counter
+) -> list[Watch]:
+    """Listen at all addresses at once for `seconds` [s] of a clock; results are in their order."""
     stop = threading.Event()
     with ThreadPoolExecutor(len(addresses)) as pool:
         try:
-            waiting = [pool.submit(_watch, address, seconds, stop) for address in addresses]
+            waiting = [pool.submit(_watch, address, seconds, stop, clock) for address in addresses]
             return [one.result() for one in waiting]
         finally:
             stop.set()  # Ctrl-C ends all of them
 
 
-def _watch(address: str, seconds: float, stop: threading.Event) -> Watch:
+def _watch(
+    address: str, seconds: float, stop: threading.Event, clock: Callable[[], float]
+) -> Watch:
     seen = Watch(address)
     try:
         stream = open_stream(_patient(urlsplit(address), seconds))
@@ -122,10 +126,10 @@ def _watch(address: str, seconds: float, stop: threading.Event) -> Watch:
         if traffic is None:
             seen.state, seen.detail = State.READY, "always there, 60 frames a second"
             return seen
-        until = time.perf_counter() + seconds  # opening has its own time
-        while not stop.wait(min(POLL_STEP, max(until - time.perf_counter(), 0.0))):
+        until = clock() + seconds  # opening has its own time
+        while not stop.wait(min(POLL_STEP, max(until - clock(), 0.0))):
             _look(seen, stream)
-            if time.perf_counter() >= until:
+            if clock() >= until:
                 break
         seen.traffic = stream.traffic  # type: ignore[attr-defined]  # a live stream has it
     return _told(seen, time.perf_counter(), seconds)

@@ -32,7 +32,6 @@ from devices.bridge.stream import Bridge, BridgeStream, open_device
 from devices.errors import InputError
 from devices.skeleton import Skeleton, SkeletonFrame
 from devices.stream import open_stream
-from replay.formats import read_recording
 from runtime.cli import main
 from runtime.output.live.bridge_publisher import BridgePublisher, binding
 
@@ -216,9 +215,9 @@ def test_the_right_keys_open_and_the_wrong_ones_get_nothing(tmp_path: Path) -> N
             (tmp_path / "other/capture/bridge.key_secret").read_bytes()
         )
         with pytest.raises(InputError, match="no connection to the bridge"):
-            open_device(urlsplit(f"{url}?keys={stage}&wait=1"))
+            open_device(urlsplit(f"{url}?keys={stage}&wait=5"))
         with pytest.raises(InputError, match="one side has keys and the other has none"):
-            open_device(urlsplit(f"{url}?wait=1"))
+            open_device(urlsplit(f"{url}?wait=5"))
         told.wait_for("one side has keys and the other has none")
         assert publisher.audience.sent == 1, "nobody else got anything"
 
@@ -465,9 +464,10 @@ def test_ctrl_c_ends_a_bridge_with_a_word_on_what_it_did(tmp_path: Path) -> None
     try:
         with open_stream(f"{endpoint_of(process)}?mode=lossless") as stream:
             assert isinstance(stream, BridgeStream)
-            frames = take(stream, lambda frames: len(frames) >= 5)
+            frames = take(stream, lambda frames: len(frames) >= 30)
+        # Each correction of the clock's offset shifts one step: most are as they were sent.
         steps = np.diff([one.time for one in frames])
-        np.testing.assert_allclose(steps, 1.0 / 60.0, atol=0.005)
+        assert np.median(steps) == pytest.approx(1.0 / 60.0, abs=0.002)
         process.send_signal(signal.SIGINT)
         _, said = process.communicate(timeout=SOON)
     finally:
@@ -485,16 +485,15 @@ def test_a_show_publishes_its_performers_to_another(tmp_path: Path) -> None:
         folder=tmp_path,
     )
     try:
-        url = endpoint_of(show)
-        out = tmp_path / "heard.mcap"
-        assert main(["record", "--device", f"{url}?mode=lossless", str(out), "--seconds", "2"]) == 0
+        with open_stream(f"{endpoint_of(show)}?mode=lossless") as stream:
+            assert isinstance(stream, BridgeStream)
+            heard = take(stream, lambda frames: {one.performer for one in frames} >= {0, 1})
+            assert "HandLeft" in stream.skeleton.names
     finally:
         show.kill()
         show.communicate()
-    heard = read_recording(out)
-    assert set(heard.performers.tolist()) == {0, 1}
-    assert "HandLeft" in heard.skeleton.names
-    assert np.isfinite(heard.positions).all()
+    assert {one.performer for one in heard} == {0, 1}
+    assert all(np.isfinite(one.positions).all() for one in heard)
 
 
 def test_the_command_refuses_in_one_line(

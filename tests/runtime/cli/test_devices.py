@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import os
 import re
@@ -11,7 +12,7 @@ import subprocess
 import sys
 import threading
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
@@ -43,21 +44,23 @@ def port() -> int:
 
 
 @contextmanager
-def sending(port: int, *datagrams: bytes) -> Iterator[None]:
-    """Somebody who sends these, one after another and again, some 100 a second."""
+def sending(port: int, *datagrams: bytes) -> Iterator[Callable[[], float]]:
+    """Somebody who sends these, one after another and again; a clock that counts them [0.01 s]."""
     stop = threading.Event()
+    now = [0.0]
 
     def send() -> None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
-            number = 0
-            while not stop.wait(0.01):
+            for number in itertools.count():
+                if stop.wait(0.01):
+                    return
                 sender.sendto(datagrams[number % len(datagrams)], ("127.0.0.1", port))
-                number += 1
+                now[0] = 0.01 * number
 
     thread = threading.Thread(target=send)
     thread.start()
     try:
-        yield
+        yield lambda: now[0]
     finally:
         stop.set()
         thread.join()
@@ -108,7 +111,10 @@ def test_each_place_has_a_state_of_its_own() -> None:
         other.close()
         third.close()
         actors = rokoko_v3({"Ann": bones(posed_rokoko()), "Bob": bones(posed_rokoko())})
-        with sending(ports[0], packed(actors)), sending(ports[1], b"noise"):
+        with (
+            sending(ports[0], packed(actors)) as one_clock,
+            sending(ports[1], b"noise") as other_clock,
+        ):
             taken, arriving, unclear, sim, leap, webcam = watch(
                 [
                     f"xsens://127.0.0.1:{holder.getsockname()[1]}",
@@ -119,6 +125,7 @@ def test_each_place_has_a_state_of_its_own() -> None:
                     "mediapipe://webcam",
                 ],
                 1.5,
+                clock=lambda: min(one_clock(), other_clock()),
             )
     assert taken.state is State.TAKEN
     assert "taken by" in taken.detail
