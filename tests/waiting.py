@@ -9,7 +9,7 @@ from typing import Protocol
 
 from devices.skeleton import SkeletonFrame
 
-PATIENCE = 120.0  # [s] far beyond what a busy machine needs
+PATIENCE = 300.0  # [s] far beyond what a busy machine needs
 GLANCE = 0.002  # [s] between two looks
 
 

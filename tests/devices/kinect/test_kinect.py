@@ -33,9 +33,9 @@ from devices.transport import sdk_library
 from devices.transport.live_stream import LiveStream
 from devices.transport.sdk_library import SensorSource, SensorTransport
 from devices.transport.senders import Decoder
+from tests.waiting import PATIENCE
 
 FAKE = Path(__file__).with_name("fake_sensors.c")
-PATIENCE = 20.0  # [s], far more than is needed
 SENSORS = (kinect_v1.SENSOR, kinect_v2.SENSOR, kinect_azure.SENSOR)
 
 

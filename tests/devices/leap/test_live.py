@@ -27,8 +27,8 @@ from devices.skeleton import SkeletonFrame
 from devices.stream import open_stream
 from devices.transport.live_stream import LiveStream
 from replay.leap.lz_string import lz_pieces
+from tests.waiting import PATIENCE
 
-PATIENCE = 20.0  # [s], far more than is needed
 ENDS = ("carp", "mcp", "pip", "dip", "btip", "tip")
 HEADER = {"version": 6, "serviceVersion": "2.3.1"}
 
@@ -559,7 +559,7 @@ controller.on('deviceFrame', frame => {
     tips: hand.fingers.map(f => ({type: f.type, tip: Array.from(f.tipPosition)}))}))});
   if (seen.length === count) { console.log(JSON.stringify(seen)); process.exit(0); }
 });
-setTimeout(() => { console.error('no frames: ' + seen.length); process.exit(3); }, 15000);
+setTimeout(() => { console.error('no frames: ' + seen.length); process.exit(3); }, 300000);
 controller.connect();
 """
 
@@ -574,7 +574,9 @@ def leapjs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "watch.js").write_text(LEAPJS)
     command = [npm, "install", "--no-audit", "--no-fund", "--silent", "leapjs@1.1.1"]
     try:
-        done = subprocess.run(command, cwd=folder, capture_output=True, timeout=60, check=False)
+        done = subprocess.run(
+            command, cwd=folder, capture_output=True, timeout=PATIENCE, check=False
+        )
     except subprocess.TimeoutExpired:
         pytest.skip("npm does not answer within a minute, so there is no leapjs")
     if done.returncode:
@@ -599,7 +601,7 @@ def test_leapjs_and_this_adapter_see_the_same_in_a_recording(leapjs: Path, share
             cwd=leapjs,
             capture_output=True,
             text=True,
-            timeout=60,
+            timeout=PATIENCE,
             check=False,
         )
     assert done.returncode == 0, done.stderr

@@ -21,8 +21,8 @@ from devices.mediapipe.webcam import Webcam, landmark_message
 from devices.skeleton import SkeletonFrame
 from devices.stream import open_stream
 from replay.formats import read_recording
+from tests.waiting import PATIENCE
 
-PATIENCE = 20.0
 SIZE = [640, 480]
 FOCAL = 320.0 / np.tan(np.radians(30.0))  # [pixels] of a camera that sees 60 degrees
 

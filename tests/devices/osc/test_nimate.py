@@ -31,6 +31,7 @@ from tests.devices.sender_packets import (
     skelecaster,
 )
 from tests.devices.vmc_sender import bundle, message
+from tests.waiting import PATIENCE
 
 TORSO = np.linalg.norm(
     OPENNI.rest_positions[OPENNI.index("Neck")] - OPENNI.rest_positions[OPENNI.index("Pelvis")]
@@ -466,11 +467,11 @@ def test_through_a_socket_from_python_osc_s_own_client() -> None:
             for one in nimate(body() + FAR, what="place"):
                 client.send_message(one.address, one.params)
             client.send_message("/NI_mate_sync", 1.0)
-        assert stream.wait(30.0)
+        assert stream.wait(PATIENCE)
         (frame,) = stream.poll()
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
             sender.sendto(skelecaster({1: kinect_body()}), ("127.0.0.1", port))
-        assert stream.wait(30.0)
+        assert stream.wait(PATIENCE)
     assert frame.positions == pytest.approx(standing(body() + FAR), abs=2e-3)
 
 

@@ -25,9 +25,9 @@ from devices.osc.vmc_decoder import VmcDecoder
 from devices.skeleton import SkeletonFrame
 from devices.transport.live_stream import LiveStream
 from devices.transport.udp import UdpTransport
+from tests.waiting import PATIENCE
 
 HUMAN = humanoid_skeleton()
-PATIENT = 60.0  # seconds until a test gives up
 POSE = "sfffffff"
 
 
@@ -39,7 +39,7 @@ def listening() -> tuple[LiveStream, int]:
 def frame_when(stream: LiveStream, send: Callable[[int], None]) -> SkeletonFrame:
     """The newest frame once there are three, sending until then."""
     frames: list[SkeletonFrame] = []
-    until = time.monotonic() + PATIENT
+    until = time.monotonic() + PATIENCE
     number = 0
     while len(frames) < 3 and time.monotonic() < until:
         send(number)
@@ -78,7 +78,7 @@ def test_python_oscs_server_understands_what_we_write() -> None:
     ]
     bundles = list(write_bundles([*bones, write_message("/VMC/Ext/T", "f", 1.5)], 1472))
     with BlockingOSCUDPServer(("127.0.0.1", 0), dispatcher) as server:
-        server.timeout = PATIENT
+        server.timeout = PATIENCE
         for bundle in bundles:
             posted(bundle, server.server_address[1])
             server.handle_request()
@@ -133,7 +133,7 @@ def node(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "vmc.js").write_text(NODE)
     fetch = ["npm", "install", "--no-audit", "--no-fund", "--ignore-scripts", "osc-min@2.1.2"]
     try:
-        done = subprocess.run(fetch, cwd=folder, capture_output=True, check=False, timeout=PATIENT)
+        done = subprocess.run(fetch, cwd=folder, capture_output=True, check=False, timeout=60)
     except subprocess.TimeoutExpired:
         pytest.skip("needs osc-min from npm, which takes too long to come")
     if done.returncode != 0:
@@ -150,7 +150,7 @@ def test_a_sender_in_javascript_is_heard(node: Path) -> None:
             assert stream.traffic.refused == 0
     finally:
         process.kill()
-        process.wait(PATIENT)
+        process.wait(PATIENCE)
     assert frame.positions[HUMAN.index("Hips")] == pytest.approx((0.5, 1.0, 0.25), abs=1e-6)
     assert not np.isnan(frame.positions[HUMAN.index("Spine")]).any()
 
@@ -167,7 +167,7 @@ def test_a_receiver_in_javascript_understands_what_we_write(node: Path) -> None:
         ]
         (bundle,) = write_bundles(messages, 1472)
         posted(bundle, port)
-        lines, _ = process.communicate(timeout=PATIENT)
+        lines, _ = process.communicate(timeout=PATIENCE)
     assert [json.loads(line) for line in lines.splitlines()] == [
         ["/VMC/Ext/Bone/Pos", ["Hips", 0.5, 1, 0.25, 0, 0, 0, 1]],
         ["/VMC/Ext/OK", [1, 3, 0]],
@@ -214,5 +214,5 @@ def test_the_vmcp_package_is_heard() -> None:
             assert stream.traffic.refused == 0
     finally:
         process.kill()
-        process.wait(PATIENT)
+        process.wait(PATIENCE)
     assert frame.positions[HUMAN.index("Hips")] == pytest.approx((0.5, 1.0, 0.25), abs=1e-6)

@@ -28,6 +28,7 @@ from tests.devices.sender_packets import (
     rokoko_v2,
     rokoko_v3,
 )
+from tests.waiting import PATIENCE
 
 COUNT = len(SKELETON.names)
 TURNS = Rotation.from_euler("yx", np.linspace(0.1, 1.0, 2 * COUNT).reshape(COUNT, 2))
@@ -254,6 +255,6 @@ def test_through_a_socket() -> None:
         assert isinstance(stream, LiveStream)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
             sender.sendto(packed(scene()), ("127.0.0.1", stream.transport.port))
-        assert stream.wait(30.0)
+        assert stream.wait(PATIENCE)
         (frame,) = stream.poll()
     assert frame.positions == pytest.approx(posed(ROKOKO), abs=1e-9)

@@ -16,6 +16,7 @@ from devices.suits.xsens import LATE, MOST_CHARACTERS, MOST_OPEN, XsensDecoder
 from devices.suits.xsens_segments import xsens_skeleton
 from devices.transport.live_stream import LiveStream
 from tests.devices.sender_packets import MVN_Y_UP, STEP, XSENS, mxtp01, mxtp02, mxtp13, posed
+from tests.waiting import PATIENCE
 
 GLOVES = xsens_skeleton(fingers=True)
 TURNS = Rotation.from_euler("yx", np.linspace(0.1, 1.0, 46).reshape(23, 2))
@@ -258,6 +259,6 @@ def test_through_a_socket() -> None:
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
             for data in mxtp02(posed(GLOVES), parts=2):
                 sender.sendto(data, ("127.0.0.1", stream.transport.port))
-        assert stream.wait(30.0)
+        assert stream.wait(PATIENCE)
         (frame,) = stream.poll()
     assert frame.positions == pytest.approx(posed(GLOVES), abs=1e-5)

@@ -14,6 +14,7 @@ from devices.transport.inbox import Inbox
 from devices.transport.live_stream import Deliver, LiveStream
 from devices.transport.senders import MOST_SENDERS, Senders
 from devices.transport.traffic import Rhythm
+from tests.waiting import PATIENCE
 
 POINT = Skeleton(("point",), np.array([-1]), np.zeros((1, 3)))
 
@@ -58,7 +59,7 @@ class Script:
         self.delivered.set()
         if self._failure is not None:
             raise self._failure
-        self._closing.wait(30.0)
+        self._closing.wait(PATIENCE)
 
     def close(self) -> None:
         self._closing.set()
@@ -71,7 +72,7 @@ def places(frames: Sequence[SkeletonFrame]) -> list[float]:
 def test_every_frame_comes_once_and_what_is_bad_is_counted() -> None:
     script = Script([b"1", b"two", b"2", b"bug", b"3"])
     with LiveStream(script, Numbers) as stream:
-        assert script.delivered.wait(30.0)
+        assert script.delivered.wait(PATIENCE)
         assert places(stream.poll()) == [1.0, 2.0, 3.0]
         assert list(stream.poll()) == []
         traffic = stream.traffic
@@ -88,7 +89,7 @@ def test_every_frame_comes_once_and_what_is_bad_is_counted() -> None:
 def test_if_nobody_polls_the_oldest_are_dropped_and_counted() -> None:
     script = Script([str(number).encode() for number in range(100)])
     with LiveStream(script, Numbers, capacity=10) as stream:
-        assert script.delivered.wait(30.0)
+        assert script.delivered.wait(PATIENCE)
         assert places(stream.poll()) == list(range(90, 100))
         assert stream.traffic.dropped == 90 + 3
     inbox = Inbox(2)
@@ -100,7 +101,7 @@ def test_if_nobody_polls_the_oldest_are_dropped_and_counted() -> None:
 def test_a_transport_that_fails_is_trouble_and_not_the_end_of_the_show(failure: Exception) -> None:
     script = Script([b"1"], failure)
     stream = LiveStream(script, Numbers)
-    stream._thread.join(30.0)
+    stream._thread.join(PATIENCE)
     assert places(stream.poll()) == [1.0]
     assert "gone" in stream.traffic.trouble or "lost" in stream.traffic.trouble
     assert not stream.ended

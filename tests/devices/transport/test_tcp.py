@@ -25,8 +25,8 @@ from devices.transport.senders import MOST_SENDERS
 from devices.transport.tcp import LONGEST, Framing, TcpTransport, take_messages
 from tests.devices.sender_packets import XSENS, mxtp01, mxtp02, mxtp13, posed
 from tests.devices.test_mutated_packets import MUTATIONS, damaged, xsens_packets
+from tests.waiting import PATIENCE
 
-PATIENT = 30.0  # seconds until a test gives up
 MXTP = Framing("MXTP", HEADER.size, datagram_length)
 PREFIXED = Framing("test", 4, lambda head: 4 + struct.unpack(">I", head)[0])
 GARBAGE = b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
@@ -56,14 +56,14 @@ def stream() -> Iterator[LiveStream]:
 def connect(stream: LiveStream) -> socket.socket:
     transport = stream.transport
     assert isinstance(transport, TcpTransport)
-    return socket.create_connection((transport.host, transport.port), PATIENT)
+    return socket.create_connection((transport.host, transport.port), PATIENCE)
 
 
 def received(stream: LiveStream, count: int) -> list[SkeletonFrame]:
     """The next frames, as soon as there are so many."""
     frames: list[SkeletonFrame] = []
     while len(frames) < count:
-        assert stream.wait(PATIENT), f"only {len(frames)} of {count} frames came"
+        assert stream.wait(PATIENCE), f"only {len(frames)} of {count} frames came"
         frames += stream.poll()
     return frames
 
@@ -285,7 +285,7 @@ def test_the_longest_silent_gives_way() -> None:
     with listening(PREFIXED) as (transport, messages), ExitStack() as held:
         where = (transport.host, transport.port)
         senders = [
-            held.enter_context(socket.create_connection(where, PATIENT))
+            held.enter_context(socket.create_connection(where, PATIENCE))
             for _ in range(MOST_SENDERS)
         ]
         for number, one in enumerate(senders):
@@ -293,7 +293,7 @@ def test_the_longest_silent_gives_way() -> None:
             messages.wait_for(number + 1)
         for connection in transport._connections:
             connection.heard -= 100.0 if connection.source == "127.0.0.1 2" else 20.0
-        with socket.create_connection(where, PATIENT) as late:
+        with socket.create_connection(where, PATIENCE) as late:
             late.sendall(b"\0\0\0\1x")
             messages.wait_for(MOST_SENDERS + 1)
             assert messages.heard[-1] == (b"\0\0\0\1x", "127.0.0.1 2")
@@ -314,7 +314,7 @@ class Messages:
 
     def wait_for(self, count: int) -> None:
         with self._came:
-            assert self._came.wait_for(lambda: len(self.heard) >= count, PATIENT)
+            assert self._came.wait_for(lambda: len(self.heard) >= count, PATIENCE)
 
 
 @contextmanager
@@ -326,14 +326,14 @@ def listening(framing: Framing, host: str = "127.0.0.1") -> Iterator[tuple[TcpTr
         yield transport, messages
     finally:
         transport.close()
-        thread.join(PATIENT)
+        thread.join(PATIENCE)
         assert not thread.is_alive()
 
 
 def test_a_machine_that_vanished_will_be_noticed() -> None:
     with (
         listening(PREFIXED) as (transport, messages),
-        socket.create_connection((transport.host, transport.port), PATIENT) as sender,
+        socket.create_connection((transport.host, transport.port), PATIENCE) as sender,
     ):
         sender.sendall(bytes(4))
         messages.wait_for(1)
@@ -349,7 +349,7 @@ def test_messages_of_any_size_come_in_order(host: str) -> None:
         pytest.skip(f"this machine has no such loopback: {error}")
     sizes = [0, 1, 16_380, 16_384, 100_000, LONGEST - 4, 0]
     with listening(PREFIXED, host) as (transport, messages):
-        with socket.create_connection((transport.host, transport.port), PATIENT) as sender:
+        with socket.create_connection((transport.host, transport.port), PATIENCE) as sender:
             for size in sizes:
                 sender.sendall(struct.pack(">I", size) + bytes(size))
             messages.wait_for(len(sizes))
@@ -364,9 +364,9 @@ def test_a_flood_is_held_back_and_nothing_is_lost(stream: LiveStream) -> None:
         writer.start()
         frames = 0
         while stream.traffic.frames < count:
-            assert stream.wait(PATIENT)
+            assert stream.wait(PATIENCE)
             frames += len(stream.poll())
-        writer.join(PATIENT)
+        writer.join(PATIENCE)
     traffic = stream.traffic
     assert traffic.packets == traffic.frames == count
     assert traffic.refused == 0

@@ -19,8 +19,8 @@ from devices.skeleton import Skeleton, SkeletonFrame
 from devices.transport.live_stream import LiveStream
 from devices.transport.port_owner import port_owner
 from devices.transport.udp import LONGEST, UdpTransport
+from tests.waiting import PATIENCE
 
-PATIENT = 30.0  # seconds until a test gives up
 ON_LINUX = sys.platform.startswith("linux")
 
 
@@ -62,7 +62,7 @@ def test_datagrams_of_any_size_come_whole_and_in_order(host: str) -> None:
         with socket.socket(family, socket.SOCK_DGRAM) as out:
             for size in sizes:
                 out.sendto(bytes(size), (transport.host, transport.port))
-        assert decoder.heard.wait(PATIENT)
+        assert decoder.heard.wait(PATIENCE)
         frames = stream.poll()
     assert [frame.positions[0, 0] for frame in frames] == sizes
     assert LONGEST >= 65_507

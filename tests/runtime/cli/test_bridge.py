@@ -34,8 +34,8 @@ from devices.skeleton import Skeleton, SkeletonFrame
 from devices.stream import open_stream
 from runtime.cli import main
 from runtime.output.live.bridge_publisher import BridgePublisher, binding
+from tests.waiting import PATIENCE
 
-SOON = 60.0  # [s] after which a test is taken to hang
 ROOT = Path(__file__).resolve().parents[3]
 BODY = Skeleton(("hips", "hand"), np.array([-1, 0]), np.array([[0.0, 1.0, 0.0], [0.5, 1.0, 0.0]]))
 ANYWHERE = "tcp://127.0.0.1:*"
@@ -65,7 +65,9 @@ class Told:
 
     def wait_for(self, words: str) -> None:
         with self._more:
-            assert self._more.wait_for(lambda: any(words in one for one in self.lines), SOON), words
+            assert self._more.wait_for(lambda: any(words in one for one in self.lines), PATIENCE), (
+                words
+            )
 
 
 @contextmanager
@@ -84,7 +86,7 @@ def bridge(
 def take(stream: BridgeStream, enough: Callable[[list[SkeletonFrame]], bool]) -> list:
     """Frames of a stream until they are enough."""
     frames: list[SkeletonFrame] = []
-    deadline = time.monotonic() + SOON
+    deadline = time.monotonic() + PATIENCE
     while not enough(frames):
         assert time.monotonic() < deadline, f"only {len(frames)} frames came: {stream.traffic}"
         stream.wait(0.05)
@@ -98,7 +100,7 @@ def take_until(stream: BridgeStream, last: int) -> list[SkeletonFrame]:
 
 def publish_until_heard(publisher: BridgePublisher, stream: BridgeStream) -> list[SkeletonFrame]:
     """Frames written one by one until one comes out of the other end."""
-    deadline = time.monotonic() + SOON
+    deadline = time.monotonic() + PATIENCE
     number = 0
     while time.monotonic() < deadline:
         number += 1
@@ -126,7 +128,7 @@ def test_latest_wins_past_a_reader_that_stands_still() -> None:
         stream.tap(lambda one: tapped.set() if int(one.positions[0, 0]) >= 2999 else None)
         for number in range(1, 3001):
             publisher.write(frame(number, performer=number % 3))
-        assert tapped.wait(SOON)
+        assert tapped.wait(PATIENCE)
         frames = take_until(stream, 3000)
         newest = {
             one.performer: number for one, number in zip(frames, numbers(frames), strict=True)
@@ -168,12 +170,12 @@ def test_a_stage_that_starts_before_the_bridge_waits_for_it() -> None:
     opened: list[BridgeStream] = []
 
     def open_it() -> None:
-        opened.append(BridgeStream(Bridge(endpoint, patience=SOON)))
+        opened.append(BridgeStream(Bridge(endpoint, patience=PATIENCE)))
 
     opening = threading.Thread(target=open_it)
     opening.start()
     with bridge(endpoint) as publisher:
-        opening.join(SOON)
+        opening.join(PATIENCE)
         with opened[0] as stream:
             assert publish_until_heard(publisher, stream)
 
@@ -361,8 +363,8 @@ def test_a_bridge_of_another_version_is_told_in_one_line() -> None:
         answering = threading.Thread(target=answer, args=(socket,))
         answering.start()
         with pytest.raises(InputError, match=f"speaks version 7 and we speak {VERSION}"):
-            BridgeStream(Bridge(endpoint, patience=SOON))
-        answering.join(SOON)
+            BridgeStream(Bridge(endpoint, patience=PATIENCE))
+        answering.join(PATIENCE)
 
 
 def test_a_stage_of_another_version_is_told_and_tells() -> None:
@@ -371,7 +373,7 @@ def test_a_stage_of_another_version_is_told_and_tells() -> None:
         said = bytearray(encode_call(Call(1, 0, 0, 0.0, 8, LATEST)))
         said[4] = 9
         socket.send(said)
-        assert socket.poll(int(SOON * 1000))
+        assert socket.poll(int(PATIENCE * 1000))
         reply = bytearray(socket.recv())
         assert reply[4] == VERSION, "so that the other side can name us"
         told.wait_for("speaks version 9")
@@ -401,13 +403,13 @@ def test_a_flood_from_a_stranger_leaves_the_bridge_serving() -> None:
         flooding = threading.Thread(target=flood, args=(socket,))
         flooding.start()
         try:
-            assert served.wait(SOON), "its own call is one like any other"
+            assert served.wait(PATIENCE), "its own call is one like any other"
             for number in range(1, 301):
                 publisher.write(frame(number))
             assert numbers(take_until(stream, 300)) == list(range(1, 301))
         finally:
             stop.set()
-            flooding.join(SOON)
+            flooding.join(PATIENCE)
         assert publisher.audience.refused > 0
         assert publisher.audience.stages == 2
 
@@ -433,7 +435,7 @@ def test_what_was_handed_over_last_still_arrives() -> None:
         closing.start()
         with stream:
             assert numbers(take_until(stream, 2000)) == list(range(1, 2001))
-        closing.join(SOON)
+        closing.join(PATIENCE)
 
 
 # -- As a user meets it ----------------------------------------------------------------------------
@@ -469,7 +471,7 @@ def test_ctrl_c_ends_a_bridge_with_a_word_on_what_it_did(tmp_path: Path) -> None
         steps = np.diff([one.time for one in frames])
         assert np.median(steps) == pytest.approx(1.0 / 60.0, abs=0.002)
         process.send_signal(signal.SIGINT)
-        _, said = process.communicate(timeout=SOON)
+        _, said = process.communicate(timeout=PATIENCE)
     finally:
         process.kill()
     assert process.returncode == 130, said

@@ -22,6 +22,7 @@ from replay.formats import read_recording
 from replay.mcap.writer import McapWriter
 from runtime.characters.builtin import builtin_character
 from runtime.show.interrupts import interruptible, interrupts_deferred
+from tests.waiting import PATIENCE
 
 FRAMES = 12
 CHARACTER = "mannequin"
@@ -29,7 +30,6 @@ BUNRAKU = [sys.executable, "-m", "runtime.cli"]
 ROOT = Path(__file__).resolve().parents[3]
 ENVIRONMENT = {**os.environ, "PYTHONPATH": str(ROOT)}
 SMALL = ["--headless", "--fast", "--size", "160x90"]
-SOON = 120  # seconds after which a test is taken to hang
 posix_only = pytest.mark.skipif(os.name != "posix", reason="signals as POSIX has them")
 
 Run = Callable[..., subprocess.CompletedProcess[str]]
@@ -57,7 +57,7 @@ def bunraku(tmp_path: Path) -> Run:
             env=ENVIRONMENT,
             capture_output=True,
             text=True,
-            timeout=SOON,
+            timeout=PATIENCE,
             check=False,
         )
 
@@ -186,7 +186,7 @@ def plain(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> NDArray[
     """What the show looks like with no option."""
     path = tmp_path_factory.mktemp("plain") / "c.pc2"
     command = [*BUNRAKU, "replay", recording, "--character", CHARACTER, *SMALL, "--cache", path]
-    subprocess.run(list(map(str, command)), env=ENVIRONMENT, check=True, timeout=SOON)
+    subprocess.run(list(map(str, command)), env=ENVIRONMENT, check=True, timeout=PATIENCE)
     return _pc2(path)
 
 
@@ -456,7 +456,7 @@ def test_an_interrupted_show_leaves_whole_files(
     with _performing(show, tmp_path, tmp_path / "c.pc2") as process:
         process.send_signal(number)
         process.send_signal(number)  # nor does an impatient second one do any harm
-        _, told = process.communicate(timeout=SOON)
+        _, told = process.communicate(timeout=PATIENCE)
     assert (process.returncode, told) == (code, "")
     cache = _pc2(tmp_path / "c.pc2")
     report = json.loads((tmp_path / "r.json").read_text())
@@ -476,7 +476,7 @@ def test_the_demo_and_a_live_show_perform_until_they_are_stopped(tmp_path: Path)
         options = ["--size", "160x90", "--headless", "--cache", "c.pc2", "--report", "r.json"]
         with _performing([*show, *options], tmp_path, cache) as process:
             process.send_signal(signal.SIGINT)
-            process.communicate(timeout=SOON)
+            process.communicate(timeout=PATIENCE)
         assert process.returncode == 130
         frames = json.loads((tmp_path / "r.json").read_text())["frames"]
         assert len(_pc2(cache)) == frames > 0
@@ -488,7 +488,7 @@ def test_an_interrupted_record_is_whole(tmp_path: Path) -> None:
     record = ["record", "--device", "sim://walk", out]
     with _performing(record, tmp_path, out, at_least=20_000) as process:
         process.send_signal(signal.SIGINT)
-        _, told = process.communicate(timeout=SOON)
+        _, told = process.communicate(timeout=PATIENCE)
     assert process.returncode == 130
     assert told == f"bunraku: {len(read_recording(out))} frames in {out}\n"
 
@@ -557,7 +557,7 @@ def test_a_reader_that_has_seen_enough_is_no_error(recording: Path, tmp_path: Pa
         env=ENVIRONMENT,
         stdout=write,
         stderr=subprocess.PIPE,
-        timeout=SOON,
+        timeout=PATIENCE,
         check=False,
     )
     os.close(write)

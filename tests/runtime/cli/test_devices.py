@@ -30,6 +30,7 @@ from runtime.cli.health_checks import EXTRAS, udp_queue
 from runtime.render.egl import egl_devices
 from tests.devices.sender_packets import XSENS, bones, mxtp02, packed, posed, rokoko_v3
 from tests.devices.vmc_sender import slime
+from tests.waiting import PATIENCE
 
 ROOT = Path(__file__).resolve().parents[3]
 linux_only = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="asks Linux")
@@ -209,7 +210,7 @@ def test_ctrl_c_ends_the_listening(port: int, tmp_path: Path) -> None:
             while port_owner(port, "udp") is None:  # binding it to see would take it away
                 assert process.poll() is None
         process.send_signal(signal.SIGINT)
-        out, error = process.communicate(timeout=60)
+        out, error = process.communicate(timeout=PATIENCE)
     finally:
         process.kill()
         process.wait()

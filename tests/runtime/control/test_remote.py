@@ -35,9 +35,9 @@ from runtime.control.remote import (
 )
 from tests.runtime.staged import StagedShow
 from tests.runtime.stick_figures import make_figure, record, waving
+from tests.waiting import PATIENCE
 
 LOOPBACK = "127.0.0.1"
-SOON = 30.0  # [s] after which a test is taken to hang
 
 
 @pytest.fixture(scope="module")
@@ -62,7 +62,7 @@ class Staged(StagedShow):
 
     def until(self, there: Callable[[], bool]) -> None:
         """Let the show go on until something is so."""
-        deadline = time.monotonic() + SOON
+        deadline = time.monotonic() + PATIENCE
         while not there():
             assert time.monotonic() < deadline, "it never came"
             self.loop.tick()
@@ -203,7 +203,7 @@ def test_lights_follow_on_the_phones_own_port(
 
 def test_who_sends_and_listens_on_one_port_is_answered_there(show: Staged) -> None:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as pedal:
-        pedal.settimeout(SOON)
+        pedal.settimeout(PATIENCE)
         pedal.connect((LOOPBACK, show.remote.port))  # hears nobody else
         pedal.send(write_message("/bunraku/freeze"))
         show.until(lambda: show.loop.frozen)

@@ -18,6 +18,7 @@ from runtime.control.window import KeyPressed, Resized, Window
 from runtime.render.camera import front_camera
 from runtime.render.context import headless_context, release_headless
 from runtime.render.stage import Stage
+from tests.waiting import PATIENCE
 
 
 @pytest.fixture
@@ -96,7 +97,7 @@ def test_without_a_display_one_line_says_to_go_headless() -> None:
         env=environment,
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
         check=True,
     )
     assert done.stderr == ""

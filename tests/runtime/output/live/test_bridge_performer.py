@@ -28,8 +28,7 @@ from runtime.show.act_group import Act
 from runtime.show.loop import FrameLoop
 from tests.runtime.show.test_loop import Kept, Wire
 from tests.runtime.stick_figures import ARMS, BODY, FRONT_VIEW, T_POSE, frame, make_figure, pose
-
-PATIENT = 60.0  # [s] after which a test is taken to hang
+from tests.waiting import PATIENCE
 
 
 @pytest.fixture
@@ -47,7 +46,7 @@ def performed(at: float, performers: Sequence[Performer]) -> PerformedFrame:
 
 def heard(stream: BridgeStream, count: int) -> list[SkeletonFrame]:
     frames: list[SkeletonFrame] = []
-    deadline = time.monotonic() + PATIENT
+    deadline = time.monotonic() + PATIENCE
     while len(frames) < count and time.monotonic() < deadline:
         stream.wait(0.05)
         frames += stream.poll()

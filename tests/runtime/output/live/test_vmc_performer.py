@@ -27,16 +27,16 @@ from runtime.driving.performer import Performer
 from runtime.output.live.humanoid_bones import HumanoidBones, humanoid_bones
 from runtime.output.live.vmc_performer import LONGEST, VmcPerformer
 from runtime.output.output import PerformedFrame
+from tests.waiting import PATIENCE
 
 HUMAN = humanoid_skeleton()
-PATIENT = 30.0  # seconds until a test gives up
 
 
 @pytest.fixture
 def marionette() -> Iterator[socket.socket]:
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as listening:
         listening.bind(("127.0.0.1", 0))
-        listening.settimeout(PATIENT)
+        listening.settimeout(PATIENCE)
         yield listening
 
 
