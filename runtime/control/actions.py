@@ -13,7 +13,7 @@ from enum import Enum
 from replay.playback import Playback
 from runtime.conditioning.switches import SWITCHES, Conditioning
 from runtime.puppet.deformable_surface import DeformableSurface, Elasticity
-from runtime.show.act_group import Cues
+from runtime.show.act_group import MatchControls
 from runtime.show.loop import FrameLoop
 from runtime.show.scene import Scene
 from runtime.show.takes import Takes
@@ -26,7 +26,7 @@ class ShowControls:
     """The parts of a show that actions change.
 
     Attributes:
-        cues: matching, of all acts.
+        match_controls: matching, of all acts.
         conditioning: the switches of the conditioning.
         loop: the frame loop, which freezes the characters.
         surfaces: the surfaces of all characters.
@@ -36,7 +36,7 @@ class ShowControls:
         leaving: whether the show is to end.
     """
 
-    cues: Cues
+    match_controls: MatchControls
     conditioning: Conditioning
     loop: FrameLoop
     surfaces: Sequence[DeformableSurface]
@@ -190,8 +190,8 @@ def _conditioning(name: str, text: str) -> Action:
 
 
 def _accept(controls: ShowControls) -> None:
-    if controls.cues.matching:
-        controls.cues.accept()
+    if controls.match_controls.matching:
+        controls.match_controls.accept()
 
 
 def _is_paused(controls: ShowControls) -> bool:
@@ -245,20 +245,22 @@ def _leave(controls: ShowControls) -> None:
 ACTIONS: Mapping[str, Action] = {
     "match-again": Action(
         "match again: strike a pose, the best match is shown",
-        press=lambda controls: controls.cues.match_again(),
-        read=lambda controls: float(controls.cues.matching),
+        press=lambda controls: controls.match_controls.match_again(),
+        read=lambda controls: float(controls.match_controls.matching),
     ),
     "accept": Action("accept the match shown; the pose is the rest state", press=_accept),
-    "next-match": Action("the next match", press=lambda controls: controls.cues.next_match()),
+    "next-match": Action(
+        "the next match", press=lambda controls: controls.match_controls.next_match()
+    ),
     "previous-match": Action(
-        "the match before", press=lambda controls: controls.cues.previous_match()
+        "the match before", press=lambda controls: controls.match_controls.previous_match()
     ),
     "rest-pose": Action(
-        "the pose is the rest state", press=lambda controls: controls.cues.take_rest()
+        "the pose is the rest state", press=lambda controls: controls.match_controls.take_rest()
     ),
     "calibrate": Action(
         "calibrate: the pose is the rest state, floor and sizes are measured anew",
-        press=lambda controls: controls.cues.calibrate(),
+        press=lambda controls: controls.match_controls.calibrate(),
     ),
     "hold": _switch("pause or resume playback (a recording)", _is_paused, _pause),
     "play": Action(

@@ -1,33 +1,60 @@
-"""Several performers with characters of their own, directed as one."""
+"""Acts: each performer with the puppets that follow; and the matching of all acts as one."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Protocol
 
+from devices.skeleton import SkeletonFrame
 from runtime.driving.match_session import MatchSession
-from runtime.driving.performer import Performer
+from runtime.driving.performer import Performer, Pose
+from runtime.driving.unfreeze_blend import UnfreezeBlend
 from runtime.puppet.puppet import Puppet
 
 
-@dataclass(frozen=True, slots=True, eq=False)
 class Act:
-    """What one performer does in the show.
+    """One performer and the puppets that follow.
+
+    Args:
+        performer: who drives.
+        puppets: what follows.
+        match_session: matches the puppets to the performer.
 
     Attributes:
-        performer: who drives.
-        puppets: who follow.
-        director: who decides what drives what.
+        performer, puppets, match_session: as given.
+        pose: the performer's newest pose in this show; None before the first frame.
     """
 
-    performer: Performer
-    puppets: Sequence[Puppet]
-    match_session: MatchSession
+    def __init__(
+        self, performer: Performer, puppets: Sequence[Puppet], match_session: MatchSession
+    ) -> None:
+        self.performer = performer
+        self.puppets = puppets
+        self.match_session = match_session
+        self.pose: Pose | None = None
+        self._unfreeze_blend = UnfreezeBlend(performer.skeleton)
+
+    def receive(self, frame: SkeletonFrame, *, frozen: bool) -> None:
+        """Take in the performer's newest frame; match, unless the characters are frozen."""
+        self.pose = self.performer.follow(frame)
+        if self.performer.calibrates:
+            self.match_session.calibrate()
+        if not frozen:
+            self.match_session.direct(frame)
+
+    def freeze(self, time: float) -> None:
+        """Keep the characters frozen at `time` [s]."""
+        self._unfreeze_blend.freeze(time)
+
+    def followed_pose(self, time: float) -> Pose | None:
+        """Return the pose that the puppets follow at `time` [s], blended after a freeze."""
+        if self.pose is None:
+            return None
+        return self._unfreeze_blend.follow(self.pose, time, self.match_session.rests)
 
 
-class Cues(Protocol):
-    """What a puppeteer may ask of the show; see `MatchSession`."""
+class MatchControls(Protocol):
+    """The actions of a puppeteer on the matching; see `MatchSession`."""
 
     @property
     def matching(self) -> bool:
@@ -60,7 +87,7 @@ class Cues(Protocol):
 
 
 class ActGroup:
-    """Gives each cue to the directors of all acts."""
+    """Passes each action on the matching to the match sessions of all acts."""
 
     def __init__(self, match_sessions: Sequence[MatchSession]) -> None:
         self._match_sessions = match_sessions

@@ -251,10 +251,7 @@ class OpenedShow:
         outputs[0].extend(self._closing.enter_context(output) for output in own)
         loop = FrameLoop(
             self._stream,
-            self.acts[0].performer,
-            self.acts[0].puppets,
-            match_session=self.acts[0].match_session,
-            others=self.acts[1:],
+            self.acts,
             report=self.report,
             scene=self.scene,
             outputs=outputs,
@@ -267,7 +264,7 @@ class OpenedShow:
 
     def _open_controls(self) -> ShowControls:
         return ShowControls(
-            cues=ActGroup([act.match_session for act in self.acts]),
+            match_controls=ActGroup([act.match_session for act in self.acts]),
             conditioning=self._conditioning,
             loop=self.loop,
             surfaces=[puppet.surface for puppet in self.puppets],

@@ -31,6 +31,7 @@ from runtime.output.report.report import Report
 from runtime.puppet.bound_skeleton import BoundSkeleton
 from runtime.puppet.deformable_surface import DeformableSurface
 from runtime.puppet.puppet import Puppet
+from runtime.show.act_group import Act
 from runtime.show.loop import FrameLoop
 from runtime.show.scene import Scene
 from solvers.deform.handles import HARD
@@ -139,9 +140,7 @@ def test_a_new_driver_moves_a_character_through_loop_outputs_and_window(
         closing.callback(scene.close)
         loop = FrameLoop(
             player,
-            performer,
-            [puppet],
-            match_session=session,
+            [Act(performer, [puppet], session)],
             report=report,
             scene=scene,
             outputs=[
@@ -221,9 +220,7 @@ def test_an_export_of_nodes_says_that_the_driver_poses_none(
     with open_export(tmp_path / f"a{suffix}", puppet.character) as export:
         loop = FrameLoop(
             player,
-            performer,
-            [puppet],
-            match_session=session,
+            [Act(performer, [puppet], session)],
             report=Report(None),
             scene=None,
             outputs=[[export]],

@@ -190,10 +190,7 @@ def frozen_show(parts: int, *, freeze: bool = True) -> np.ndarray:
     kept = [[Kept()] for _ in acts]
     loop = FrameLoop(
         player,
-        acts[0].performer,
-        acts[0].puppets,
-        match_session=acts[0].match_session,
-        others=acts[1:],
+        acts,
         report=Report(None),
         scene=None,
         outputs=kept,

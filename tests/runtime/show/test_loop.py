@@ -99,11 +99,10 @@ def loop_of(  # what every show needs, with what a test cares for
         puppet.surface.reset()
     performer = Performer(BODY)
     hands = [Mapping(ARMS)] * len(puppets)
+    match_session = MatchSession(performer, puppets, lambda: FRONT_VIEW, Choices(), hands)
     return FrameLoop(
         player if recorder is None else RecordedStream(player, recorder.write),
-        performer,
-        puppets,
-        match_session=MatchSession(performer, puppets, lambda: FRONT_VIEW, Choices(), hands),
+        [Act(performer, puppets, match_session)],
         report=report or Report(None),
         scene=scene,
         outputs=outputs,
@@ -374,10 +373,7 @@ def test_each_performer_drives_a_character_of_their_own(puppet: Puppet) -> None:
     report = Report(None)
     loop = FrameLoop(
         player,
-        acts[0].performer,
-        acts[0].puppets,
-        match_session=acts[0].match_session,
-        others=acts[1:],
+        acts,
         report=report,
         scene=None,
         outputs=kept,
@@ -471,9 +467,7 @@ def test_a_pose_that_is_held_becomes_the_rest_state_without_a_hand_free(puppet: 
     kept = Kept()
     loop = FrameLoop(
         wire,
-        performer,
-        [puppet],
-        match_session=match_session,
+        [Act(performer, [puppet], match_session)],
         report=Report(None),
         scene=None,
         outputs=[[kept]],

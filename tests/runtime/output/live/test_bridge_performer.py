@@ -96,13 +96,9 @@ def two_acts(switches: Conditioning) -> list[Act]:
 def loop_over(
     stream: SkeletonStream, acts: list[Act], outputs: Sequence[Sequence[Output]]
 ) -> FrameLoop:
-    lead, *others = acts
     return FrameLoop(
         stream,
-        lead.performer,
-        lead.puppets,
-        match_session=lead.match_session,
-        others=others,
+        acts,
         report=Report(None),
         scene=None,
         outputs=outputs,
