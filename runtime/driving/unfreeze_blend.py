@@ -61,7 +61,7 @@ class UnfreezeBlendState:
     """
 
     shown: Pose | None
-    rests: Sequence[Rest | None]
+    rests: tuple[Rest | None, ...]
     offset: _Offset | None
     frozen: bool
     at: float
@@ -92,7 +92,7 @@ class UnfreezeBlend:
         """Return what is remembered between frames."""
         return UnfreezeBlendState(
             self._shown,
-            self._rests,
+            tuple(self._rests),
             self._offset,
             self._frozen,
             self._at,

@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 from devices.skeleton import SkeletonFrame
-from runtime.driving.match_session import MatchSession
-from runtime.driving.performer import Performer, Pose
-from runtime.driving.unfreeze_blend import UnfreezeBlend
-from runtime.puppet.puppet import Puppet
+from runtime.driving.match_session import MatchSession, MatchSessionState
+from runtime.driving.performer import Performer, PerformerState, Pose
+from runtime.driving.unfreeze_blend import UnfreezeBlend, UnfreezeBlendState
+from runtime.puppet.puppet import Puppet, PuppetState
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ActState:
+    """The state of an `Act` between two frames: the states of its parts, and the newest pose."""
+
+    performer: PerformerState
+    match_session: MatchSessionState
+    unfreeze_blend: UnfreezeBlendState
+    puppets: tuple[PuppetState, ...]
+    pose: Pose | None
 
 
 class Act:
@@ -33,6 +45,25 @@ class Act:
         self.match_session = match_session
         self.pose: Pose | None = None
         self._unfreeze_blend = UnfreezeBlend(performer.skeleton)
+
+    def snapshot(self) -> ActState:
+        """Return what is remembered between frames."""
+        return ActState(
+            self.performer.snapshot(),
+            self.match_session.snapshot(),
+            self._unfreeze_blend.snapshot(),
+            tuple(puppet.snapshot() for puppet in self.puppets),
+            self.pose,
+        )
+
+    def restore(self, state: ActState) -> None:
+        """Go back to a snapshot of an act with the same puppets."""
+        self.performer.restore(state.performer)
+        self.match_session.restore(state.match_session)
+        self._unfreeze_blend.restore(state.unfreeze_blend)
+        for puppet, own in zip(self.puppets, state.puppets, strict=True):
+            puppet.restore(own)
+        self.pose = state.pose
 
     def receive(self, frame: SkeletonFrame, *, frozen: bool) -> None:
         """Take in the performer's newest frame; match, unless the characters are frozen."""

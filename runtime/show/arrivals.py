@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from devices.skeleton import SkeletonFrame
 from devices.stream import SkeletonStream
-from runtime.conditioning.reception import Reception
+from runtime.conditioning.reception import Reception, ReceptionState
 from runtime.conditioning.switches import Conditioning, filled_only
-from runtime.show.performer_slots import PerformerSlots
+from runtime.show.performer_slots import PerformerSlots, PerformerSlotsState
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -25,6 +25,15 @@ class Arrived:
     newest: SkeletonFrame | None
     of_slots: Mapping[int, SkeletonFrame]
     dropped: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class ArrivalsState:
+    """The state of `Arrivals` between two frames: the states of its parts, and the count."""
+
+    reception: ReceptionState
+    performer_slots: PerformerSlotsState
+    count: int
 
 
 class Arrivals:
@@ -46,6 +55,17 @@ class Arrivals:
         self._stream = stream
         self._reception = Reception(stream.skeleton, conditioning or filled_only())
         self._performer_slots = PerformerSlots(slots)
+
+    def snapshot(self) -> ArrivalsState:
+        """Return what is remembered between frames."""
+        slots = self._performer_slots.snapshot()
+        return ArrivalsState(self._reception.snapshot(), slots, self.count)
+
+    def restore(self, state: ArrivalsState) -> None:
+        """Go back to a snapshot."""
+        self._reception.restore(state.reception)
+        self._performer_slots.restore(state.performer_slots)
+        self.count = state.count
 
     def poll(self) -> Arrived:
         """Return what came since the last call."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 from devices.skeleton import SkeletonFrame
 from devices.stream import SkeletonStream
@@ -16,11 +17,34 @@ from runtime.conditioning.switches import Conditioning
 from runtime.output.output import Output, PerformedFrame
 from runtime.output.report.report import Report
 from runtime.puppet.puppet import Motion
-from runtime.show.act_group import Act
-from runtime.show.arrivals import Arrivals
+from runtime.show.act_group import Act, ActState
+from runtime.show.arrivals import Arrivals, ArrivalsState
 from runtime.show.clock import StageTimer
 from runtime.show.picture_schedule import PictureSchedule
 from runtime.show.scene import Scene
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FrameLoopState:
+    """The state of a `FrameLoop` between two frames; the stream has its own.
+
+    Attributes:
+        arrivals, acts: the states of its parts.
+        motions: each puppet as it was performed last, with arrays of its own.
+        unsettled: whether the surfaces are still to settle.
+        pictured: [s] the show's time of the last picture.
+        frames, seconds: as of `FrameLoop`.
+        began: [s] time of the first frame.
+    """
+
+    arrivals: ArrivalsState
+    acts: tuple[ActState, ...]
+    motions: tuple[Motion, ...]
+    unsettled: bool
+    pictured: float
+    frames: int
+    seconds: float
+    began: float
 
 
 class FrameLoop:
@@ -95,6 +119,8 @@ class FrameLoop:
                 self._report.dropped += arrived.dropped
             if arrived.newest is not None:
                 self._perform(arrived.newest, arrived.of_slots)
+                self._publish(arrived.newest)
+                self._count(arrived.newest)
             else:
                 self._pictures.idle(self.draw)
         if arrived.newest is None:
@@ -102,6 +128,46 @@ class FrameLoop:
         for stage, spent in self._timer.stages.items():
             self._report.times.add(stage, spent)
         return True
+
+    def advance(self) -> bool:
+        """Perform what has come since the last tick, without showing or publishing it.
+
+        The state afterwards is that after `tick`.
+
+        Returns:
+            Whether a frame was performed.
+        """
+        self.settle()
+        arrived = self._arrivals.poll()
+        if arrived.newest is None:
+            return False
+        self._perform(arrived.newest, arrived.of_slots)
+        self._pictures.is_due(arrived.newest.time)
+        self._count(arrived.newest)
+        return True
+
+    def snapshot(self) -> FrameLoopState:
+        """Return everything that the next frames depend on, besides stream and settings."""
+        return FrameLoopState(
+            self._arrivals.snapshot(),
+            tuple(act.snapshot() for act in self._acts),
+            _copies(self.motions),
+            self._unsettled,
+            self._pictures.snapshot(),
+            self.frames,
+            self.seconds,
+            self._began,
+        )
+
+    def restore(self, state: FrameLoopState) -> None:
+        """Go back to a snapshot of a loop with the same acts; `frozen` stays as it is."""
+        self._arrivals.restore(state.arrivals)
+        for act, own in zip(self._acts, state.acts, strict=True):
+            act.restore(own)
+        self.motions = list(_copies(state.motions))
+        self._unsettled = state.unsettled
+        self._pictures.restore(state.pictured)
+        self.frames, self.seconds, self._began = state.frames, state.seconds, state.began
 
     def settle(self) -> None:
         """Bring the surfaces nearer to their targets, between one tick and the next.
@@ -146,7 +212,8 @@ class FrameLoop:
         if not self.frozen:
             self.motions = motions
             self._unsettled = True
-        self._publish(frame)
+
+    def _count(self, frame: SkeletonFrame) -> None:
         self._began = frame.time if self.frames == 0 else self._began
         self.seconds = frame.time - self._began
         self.frames += 1
@@ -170,3 +237,8 @@ class FrameLoop:
                 )
                 for output in own:
                     output.write(performed)
+
+
+def _copies(motions: Sequence[Motion]) -> tuple[Motion, ...]:
+    """Return motions with vertices that no puppet overwrites."""
+    return tuple(replace(motion, vertices=motion.vertices.copy()) for motion in motions)

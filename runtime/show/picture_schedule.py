@@ -52,15 +52,30 @@ class PictureSchedule:
         Returns:
             (H, W, 4) uint8 its picture, if an output wants one of this frame.
         """
-        wanted = math.isfinite(self._step) and time - self._taken >= self._step
+        wanted = self.is_due(time)
         if self._scene is None or not (self._shown or wanted):
             return None
         draw()
         if not wanted:
             return None
         picture = self._scene.picture()
-        self._taken, self._taken_at = time, self._clock()
+        self._taken_at = self._clock()
         return picture
+
+    def is_due(self, time: float) -> bool:
+        """Return whether outputs want a picture at `time` [s]; the next is due one step later."""
+        due = math.isfinite(self._step) and time - self._taken >= self._step
+        if due:
+            self._taken = time
+        return due
+
+    def snapshot(self) -> float:
+        """Return the show's time [s] of the last picture."""
+        return self._taken
+
+    def restore(self, taken: float) -> None:
+        """Go back to a snapshot."""
+        self._taken = taken
 
     def idle(self, draw: Callable[[], None]) -> None:
         """Draw although no frame has come: the camera and the light may change.

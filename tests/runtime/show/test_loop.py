@@ -183,6 +183,30 @@ def test_two_replays_are_the_same_to_the_last_bit(puppet: Puppet) -> None:
     np.testing.assert_array_equal(*runs)
 
 
+def test_a_loop_goes_on_from_a_snapshot_as_it_did_the_first_time(puppet: Puppet) -> None:
+    """Shown or not, settled or not, and after frames that are forgotten again."""
+    player, kept = Player(record(waving(12)), EveryFrame()), Kept(math.inf)
+    loop = loop_of(player, [puppet], [[kept]])
+    for _ in range(4):
+        loop.tick()
+    states = player.snapshot(), loop.snapshot()
+    play(loop, player)
+    for go_on in (FrameLoop.tick, FrameLoop.advance):
+        player.restore(states[0])
+        loop.restore(states[1])
+        np.testing.assert_array_equal(loop.motions[0].vertices, kept.frames[3].vertices)
+        assert (loop.frames, loop.received) == (4, 4)
+        loop.settle()
+        shapes = []
+        while not player.ended:
+            go_on(loop)
+            shapes.append(loop.motions[0].vertices.copy())
+        wanted = [frame.vertices for frame in kept.frames[4:12]]
+        np.testing.assert_array_equal(shapes, wanted)
+        assert loop.seconds == pytest.approx(1.1)
+    assert len(kept.frames) == 12 + 8, "what is only advanced is not published"
+
+
 def test_it_does_not_matter_to_what_is_shown_who_settles_and_when(puppet: Puppet) -> None:
     shown = []
     for settles in (True, False):
