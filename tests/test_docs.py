@@ -4,8 +4,11 @@ from __future__ import annotations
 
 import itertools
 import json
+import os
 import re
 import shlex
+import subprocess
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -65,7 +68,21 @@ def smaller(command: str) -> list[str]:
     return arguments
 
 
-RUNNABLE = [name for name in NAMES if any(block.info == "sh runnable" for block in blocks(name))]
+def run_python(text: str) -> None:
+    """Run a documented program in a process of its own, in the current folder."""
+    done = subprocess.run(
+        [sys.executable, "-W", "error", "-c", text],
+        env={**os.environ, "PYTHONPATH": str(CHECKOUT)},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+
+
+RUNNABLE = [
+    name for name in NAMES if any(block.info.endswith("runnable") for block in blocks(name))
+]
 
 
 @pytest.mark.parametrize("name", RUNNABLE)
@@ -78,6 +95,8 @@ def test_marked_examples_run_in_order(
         kind, _, file = block.info.partition(" ")
         if kind == "json" and file:
             Path(file).write_text(block.text, encoding="utf-8")
+        if block.info == "python runnable":
+            run_python(block.text)
         if block.info != "sh runnable":
             continue
         assert block.commands == block.text.strip().splitlines()

@@ -16,12 +16,12 @@ def is_character(name: str) -> bool:
     return name in BUILTIN or Path(name).suffix.lower() in SUFFIXES
 
 
-def load_character(name: str) -> Character:
+def load_character(name: str | Path) -> Character:
     """The built-in character or the character in the file called `name`.
 
     Raises:
         InputError: there is no such file or built-in character, or the file cannot be used.
     """
-    if name in BUILTIN:
-        return builtin_character(name)
+    if str(name) in BUILTIN:
+        return builtin_character(str(name))
     return seen_from_best_side(unbundled(read_character(Path(name))))

@@ -121,6 +121,18 @@ class OpenedShow:
             leave_windows()
             make_current(self._context)
 
+    def complete_report(self) -> None:
+        """Put the recording and the matches, as they are now, into the report."""
+        skeleton, recording = self._stream.skeleton, self._recording
+        if recording is None:
+            frames, seconds = self.loop.received, self.loop.seconds
+        else:
+            frames, seconds = len(recording), recording.seconds
+        self.report.recorded(frames=frames, joints=len(skeleton.names), seconds=seconds)
+        mappings = [mapping for act in self.acts for mapping in act.match_session.mappings]
+        for part, mapping in zip(self._parts, mappings, strict=True):
+            part.matched(mapping, skeleton)
+
     @property
     def _recording(self) -> Recording | None:
         playback = playback_of(self._source)
@@ -259,7 +271,7 @@ class OpenedShow:
             shown=self._shown,
             clock=self._clock,
         )
-        self._closing.callback(self._complete_report, loop)
+        self._closing.callback(self.complete_report)
         return loop
 
     def _open_controls(self) -> ShowControls:
@@ -296,18 +308,6 @@ class OpenedShow:
     def _open_recorder(self, path: Path) -> Recorder:
         origin = self._settings.origin or type(self._source).__name__
         return Recorder(path, self._stream.skeleton, source=provenance(origin), tell=self._warn)
-
-    def _complete_report(self, loop: FrameLoop) -> None:
-        """Add what is only known at the end."""
-        skeleton, recording = self._stream.skeleton, self._recording
-        if recording is None:
-            frames, seconds = loop.received, loop.seconds
-        else:
-            frames, seconds = len(recording), recording.seconds
-        self.report.recorded(frames=frames, joints=len(skeleton.names), seconds=seconds)
-        mappings = [mapping for act in self.acts for mapping in act.match_session.mappings]
-        for part, mapping in zip(self._parts, mappings, strict=True):
-            part.matched(mapping, skeleton)
 
 
 def _driver(name: str) -> DriverFactory:

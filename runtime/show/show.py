@@ -19,6 +19,7 @@ from replay.playback import Playback, playback_of
 from runtime.characters.character import Character
 from runtime.driving.drivers import DriverFactory
 from runtime.output.output import Output
+from runtime.output.report.report import Report
 from runtime.puppet.puppet import Motion
 from runtime.show import messages
 from runtime.show.collector_pauses import collector_paused, objects_frozen
@@ -60,7 +61,6 @@ class Show:
             `runtime.control.actions`, with the loop, the takes and the scene.
         acts: each performer with their puppets and their match session.
         puppets: the characters as they are driven.
-        report: the figures of the show so far.
 
     Raises:
         InputError: a file or device cannot be opened, or settings do not fit the characters or the
@@ -103,7 +103,7 @@ class Show:
             self.close()
             raise
         self._loop, self._scene = self._opened.loop, self._opened.scene
-        self.controls, self.report = self._opened.controls, self._opened.report
+        self.controls = self._opened.controls
         self.acts, self.puppets = self._opened.acts, self._opened.puppets
         self._pace = pace or pace_of(stream)
         self._spare_time = SpareTime(self._pace, self._loop)
@@ -190,6 +190,12 @@ class Show:
         self._enter_graphics()
         self._loop.draw()
         return self._scene.picture()
+
+    @property
+    def report(self) -> Report:
+        """The figures of the show so far; ``report.summary()`` has the keys of docs/outputs.md."""
+        self._opened.complete_report()
+        return self._opened.report
 
     @property
     def playback(self) -> Playback | None:
