@@ -1,7 +1,7 @@
-"""What the values of options may be; each takes the text and gives the value.
+"""Types of option values: each function takes the text of an option and returns its value.
 
 Raises:
-    argparse.ArgumentTypeError: one line that says what is expected.
+    argparse.ArgumentTypeError: the text is no such value; the message says what is expected.
 """
 
 from __future__ import annotations
@@ -10,9 +10,11 @@ import argparse
 import math
 import string
 
+from runtime.show.settings import LEAST_SIDE, MOST_SIDE, MOST_STIFFNESS, MOST_VOLUME_GAIN
+
 
 def size(text: str) -> tuple[int, int]:
-    """A picture's width and height from ``WxH``."""
+    """Width and height of a picture [px], from ``WxH``."""
     width, _, height = text.lower().partition("x")
     try:
         pair = int(width), int(height)
@@ -20,8 +22,10 @@ def size(text: str) -> tuple[int, int]:
         raise argparse.ArgumentTypeError(
             f"expected WIDTHxHEIGHT, as in 960x540, got {text!r}"
         ) from None
-    if not (16 <= pair[0] <= 8192 and 16 <= pair[1] <= 8192):
-        raise argparse.ArgumentTypeError(f"each side must be 16 to 8192 pixels, got {text!r}")
+    if not all(LEAST_SIDE <= side <= MOST_SIDE for side in pair):
+        raise argparse.ArgumentTypeError(
+            f"each side must be {LEAST_SIDE} to {MOST_SIDE} pixels, got {text!r}"
+        )
     return pair
 
 
@@ -61,12 +65,12 @@ def share(text: str) -> float:
 
 def stiffness(text: str) -> float:
     """A number from 0 to 0.99."""
-    return _between(text, 0.0, 0.99)
+    return _between(text, 0.0, MOST_STIFFNESS)
 
 
 def gain(text: str) -> float:
     """A number from 0 to 10."""
-    return _between(text, 0.0, 10.0)
+    return _between(text, 0.0, MOST_VOLUME_GAIN)
 
 
 def _between(text: str, least: float, most: float) -> float:
@@ -104,7 +108,7 @@ def host_port(text: str) -> tuple[str, int | None]:
 
 
 def remote_address(text: str) -> tuple[str, int | None]:
-    """A host and a port to be run from; ``osc://`` before them is no harm."""
+    """A host and a port, as of `host_port`; ``osc://`` may stand before them."""
     return host_port(text.removeprefix("osc://"))
 
 

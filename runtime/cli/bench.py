@@ -11,7 +11,7 @@ from typing import Any
 from devices.errors import InputError
 from runtime.cli.arguments import positive
 
-HELP = "how fast it is here"
+HELP = "measure the speed of this machine"
 
 DEFAULT = ("arap", "table1", "hold", "dense", "tick", "match", "spacetime")
 LONG = ("clips", "soak", "kill", "latency")  # only when named

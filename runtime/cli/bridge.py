@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from devices.stream import SkeletonStream
     from runtime.output.live.bridge_publisher import BridgePublisher
 
-HELP = "a live stream goes to shows on other machines"
+HELP = "send a live performer to shows on other machines"
 POLLS = 240.0  # a second: twice the rate of the fastest sensor
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from runtime.cli.arguments import positive, whole
 
-HELP = "a recording becomes a file of another kind"
+HELP = "convert a recording to another format"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

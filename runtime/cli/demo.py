@@ -8,7 +8,7 @@ import sys
 
 from runtime.cli.show_options import add_character_option, add_show_options
 
-HELP = "one performer, several characters, nothing else needed"
+HELP = "play the built-in show with the built-in characters"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

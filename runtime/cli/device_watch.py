@@ -118,37 +118,37 @@ def _watch(
 ) -> Watch:
     seen = Watch(address)
     try:
-        stream = open_stream(_patient(urlsplit(address), seconds))
+        stream = open_stream(_with_wait(urlsplit(address), seconds))
     except InputError as error:
-        return _closed(seen, str(error))
+        return _not_opened(seen, str(error))
     with stream:
         traffic = getattr(stream, "traffic", None)
         if traffic is None:
             seen.state, seen.detail = State.READY, "always there, 60 frames a second"
             return seen
-        until = clock() + seconds  # opening has its own time
+        until = clock() + seconds  # opening takes time of its own
         while not stop.wait(min(POLL_STEP, max(until - clock(), 0.0))):
-            _look(seen, stream)
+            _poll(seen, stream)
             if clock() >= until:
                 break
         seen.traffic = stream.traffic  # type: ignore[attr-defined]  # a live stream has it
-    return _told(seen, time.perf_counter(), seconds)
+    return _described(seen, time.perf_counter(), seconds)
 
 
-def _patient(address: SplitResult, seconds: float) -> str:
+def _with_wait(address: SplitResult, seconds: float) -> str:
     """The address; for a bridge with the time to wait for it, unless the address has one."""
     if address.scheme == "zmq+tcp" and "wait=" not in address.query:
         return f"{address.geturl()}{'&' if address.query else '?'}wait={seconds}"
     return address.geturl()
 
 
-def _look(seen: Watch, stream: SkeletonStream) -> None:
+def _poll(seen: Watch, stream: SkeletonStream) -> None:
     for frame in stream.poll():
         seen.performers.add(frame.performer)
         seen.joints = max(seen.joints, int(np.count_nonzero(frame.confidence)))
 
 
-def _closed(seen: Watch, reason: str) -> Watch:
+def _not_opened(seen: Watch, reason: str) -> Watch:
     """The result for an address that cannot be opened: a taken port, or something missing."""
     address = urlsplit(seen.address)
     seen.state, seen.detail = State.MISSING, reason.partition(": ")[2] or reason
@@ -163,7 +163,7 @@ def _closed(seen: Watch, reason: str) -> Watch:
     return seen
 
 
-def _told(seen: Watch, now: float, seconds: float) -> Watch:
+def _described(seen: Watch, now: float, seconds: float) -> Watch:
     traffic = seen.traffic
     assert traffic is not None
     seen.silence = now - traffic.last_seen
@@ -189,13 +189,13 @@ def _told(seen: Watch, now: float, seconds: float) -> Watch:
 
 
 def listening_ports() -> list[int]:
-    """The UDP ports of this machine that the places in `PLACES` open."""
+    """The UDP ports of this machine that the addresses of `PLACES` open."""
     listening = [address for address in PLACES if urlsplit(address).scheme in LISTENS]
     return [port for address in listening if (port := port_of(address)) is not None]
 
 
 def port_of(address: str) -> int | None:
-    """The port that an address names; None where it names none."""
+    """The port of an address; None where it has none."""
     try:
         return urlsplit(address).port
     except ValueError:
@@ -203,7 +203,12 @@ def port_of(address: str) -> int | None:
 
 
 def write_json(path: Path, seconds: float, watches: Sequence[Watch]) -> None:
-    """Write what was seen in so many seconds [s].
+    """Write the results of `watch` as JSON.
+
+    Args:
+        path: the file to write.
+        seconds: how long [s] the addresses were listened to.
+        watches: the results.
 
     Raises:
         InputError: the file cannot be written.

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from runtime.cli.arguments import positive
 
-HELP = "what is connected, what arrives, which ports are taken"
+HELP = "list connected devices, arriving data and taken ports"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-HELP = "what is wrong with this machine"
+HELP = "check this machine"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

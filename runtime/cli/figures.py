@@ -8,7 +8,7 @@ from pathlib import Path
 from runtime.cli.arguments import size
 from runtime.cli.show_options import add_character_option
 
-HELP = "draw the figures on squash and stretch"
+HELP = "draw the paper's figures on squash and stretch"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

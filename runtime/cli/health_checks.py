@@ -44,7 +44,7 @@ EXTRAS: dict[str, tuple[str, ...]] = {
 }
 if sys.platform in ("win32", "darwin"):
     EXTRAS["spout"] = ("SpoutGL",) if sys.platform == "win32" else ("syphon",)
-LONGEST_QUEUE = Path("/proc/sys/net/core/rmem_max")  # [bytes] that Linux gives a socket at most
+LONGEST_QUEUE = Path("/proc/sys/net/core/rmem_max")  # [bytes] the most that Linux gives a socket
 WARM_FRAMES = 3
 
 Check = Callable[[], str]
@@ -96,14 +96,14 @@ def _display() -> str:
     if not sys.platform.startswith("linux"):
         return "native"
     shown = os.environ.get("WAYLAND_DISPLAY") or os.environ.get("DISPLAY")
-    return shown or "none: shows go on with --headless"
+    return shown or "none: run shows with --headless"
 
 
 def _cache() -> str:
     folder: Path = cache_folder()
     folder.mkdir(parents=True, exist_ok=True)
     if not os.access(folder, os.W_OK):
-        raise InputError(f"{folder} cannot be written: skeletons are extracted anew every time")
+        raise InputError(f"{folder} cannot be written: every start extracts skeletons again")
     return str(folder)
 
 
@@ -122,7 +122,7 @@ CHECKS: dict[str, Check] = {
 
 
 def _ports(name: str) -> str:
-    """Which of the devices' ports others have; so does another show, which is no fault."""
+    """The UDP ports of devices that other programs have, such as another show: no fault."""
     taken = [port for port in listening_ports() if not _is_free(port)]
     if not taken:
         return f"ok       {name:<12} {', '.join(map(str, listening_ports()))} are free"
@@ -143,7 +143,7 @@ def _is_free(port: int) -> bool:
 
 
 def udp_queue(name: str, limit: Path = LONGEST_QUEUE) -> str:
-    """How many bytes of datagrams wait at most while the program is busy."""
+    """The most bytes of datagrams that wait while the program is busy."""
     try:
         longest = int(limit.read_text(encoding="ascii"))
     except (OSError, ValueError):
@@ -156,7 +156,7 @@ def udp_queue(name: str, limit: Path = LONGEST_QUEUE) -> str:
 
 Note = Callable[[str], str]
 NOTES: dict[str, Note] = {"UDP ports": _ports, "UDP queue": udp_queue}
-"""What is told and is no fault of the machine's."""
+"""Notes: they do not count as wrong."""
 
 
 def _extra(extra: str, modules: tuple[str, ...]) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-HELP = "what is in a recording or a character's file"
+HELP = "show what a recording or a character contains"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

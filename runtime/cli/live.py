@@ -6,7 +6,7 @@ import argparse
 
 from runtime.cli.show_options import add_character_option, add_show_options
 
-HELP = "a live stream drives a character"
+HELP = "drive characters with a live performer"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

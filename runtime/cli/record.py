@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from devices.stream import SkeletonStream
     from replay.recorder import Recorder
 
-HELP = "a live stream goes to a file, without a character"
+HELP = "record a live performer, without a character"
 POLLS = 240.0  # a second: twice the rate of the fastest sensor
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from runtime.cli.show_options import add_character_option, add_show_options
 
-HELP = "a recorded stream drives a character"
+HELP = "drive characters with a recording"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

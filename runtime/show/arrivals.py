@@ -73,7 +73,7 @@ class Arrivals:
         frames = self._reception.receive(came)
         of_slots = {}
         for frame in frames:
-            slot = self._performer_slots.part(frame)
+            slot = self._performer_slots.slot(frame)
             if slot is not None:
                 of_slots[slot] = frame
         newest = of_slots.get(0, next(iter(of_slots.values()), frames[-1] if frames else None))

@@ -1,4 +1,4 @@
-"""Keeping time: the loop's ticks in real time, and the share of a tick that each stage takes."""
+"""A ticker that keeps a steady rate, and a timer of the stages of a tick."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from collections.abc import Callable
 
 
 class Ticker:
-    """Holds a loop to a steady rate without drifting; a late tick is not made up for.
+    """Keeps a loop at a steady rate without drift; a late tick is not caught up.
 
     Args:
         rate: ticks a second.
         clock: host monotonic time [s].
-        sleep: waits for so many seconds.
+        sleep: sleeps for a number of seconds.
     """
 
     def __init__(
@@ -35,19 +35,19 @@ class Ticker:
         self._next = max(self._next, now) + self._period
 
     def is_due(self) -> bool:
-        """Whether the next tick should have begun already."""
+        """Whether the next tick is due already."""
         return self._clock() >= self._next
 
 
 class StageTimer:
-    """How long the stages of the current tick have taken; a stage may run more than once.
+    """Adds up the time of each stage of the current tick; a stage may run more than once.
 
     Args:
         clock: any clock [s] of high resolution.
 
     Attributes:
         stages: name of each stage to its time in this tick [s].
-        clock: what measures it.
+        clock: the clock above.
     """
 
     def __init__(self, clock: Callable[[], float] = time.perf_counter) -> None:
@@ -59,16 +59,16 @@ class StageTimer:
         return _Stage(self, name)
 
     def add(self, name: str, spent: float) -> None:
-        """Count so much time [s] for the stage `name`."""
+        """Add time [s] to the stage `name`."""
         self.stages[name] = self.stages.get(name, 0.0) + spent
 
     def reset(self) -> None:
-        """Begin a new tick."""
+        """Start a new tick."""
         self.stages = {}
 
 
 class _Stage:
-    """One stage's block; a generator in its place would take three times as long."""
+    """The block of one stage; a class, because a generator would take three times as long."""
 
     __slots__ = ("_began", "_name", "_timer")
 

@@ -1,4 +1,4 @@
-"""Pauses that the language makes, kept out of a show."""
+"""Keeping pauses of Python's garbage collector out of a show."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from contextlib import contextmanager
 
 @contextmanager
 def collector_paused() -> Iterator[None]:
-    """Within the block the garbage collector does not look for what may go.
+    """Switch the garbage collector off within the block.
 
-    For what is loaded and built before a show: nearly all of it stays, and the collector would look
-    through it again and again, a tenth of the time that it takes. What refers to itself and is
-    dropped there is collected afterwards, or with what is `objects_frozen`.
+    For loading and building before a show. Nearly all objects made there stay, and the collector
+    would search them again and again, which takes a tenth of the time. Cycles that are dropped in
+    the block are collected later.
     """
     was_on = gc.isenabled()
     gc.disable()
@@ -26,10 +26,10 @@ def collector_paused() -> Iterator[None]:
 
 @contextmanager
 def objects_frozen() -> Iterator[None]:
-    """Within the block the garbage collector leaves alone what was there before it.
+    """Exempt all objects made before the block from garbage collection within it.
 
-    It looks through everything now and then, and what is loaded for a show takes it 0.1 s: six
-    frames. What is made within the block is collected as ever.
+    A full search of everything that a show loads takes 0.1 s, which is six frames. Objects made
+    within the block are collected as usual.
     """
     gc.freeze()
     try:

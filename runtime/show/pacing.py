@@ -1,4 +1,4 @@
-"""When the loop's next tick comes: at a steady rate, or as soon as there is a frame to perform."""
+"""The pace of a show: when the next tick begins, and what the time until then is used for."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from typing import Protocol, runtime_checkable
 from devices.stream import SkeletonStream
 from runtime.show.clock import Ticker
 
-TICKS = 60.0  # a second, where nothing else sets the pace
-LULL = 0.04  # [s] without a frame, more than between those of a camera; only then tick without one
-MOST_TICKS = 240.0  # a second; what comes faster, from several performers, is taken together
+TICKS = 60.0  # a second, where no frame sets the pace
+LULL = 0.04  # [s] without a frame before a tick without one; longer than a camera's step
+MOST_TICKS = 240.0  # a second; frames that come faster, of several performers, share a tick
 
 
 class Pace(Protocol):
     """Waits between ticks."""
 
     def wait(self) -> None:
-        """Return when the next tick should begin."""
+        """Return when the next tick is due."""
         ...
 
     def is_due(self) -> bool:
-        """Whether the next tick should have begun already."""
+        """Whether the next tick is due already."""
         ...
 
 
@@ -31,19 +31,21 @@ class Waking(Protocol):
     """A stream that can be waited for."""
 
     def wait(self, seconds: float) -> bool:
-        """Sleep until a frame is there, at most so long; whether one is."""
+        """Sleep until a frame is there, at most `seconds` [s]; return whether one is."""
         ...
 
 
 class OnArrival:
-    """A tick as soon as a frame is there, so that none waits for a tick, at most `MOST_TICKS` a
-    second; once none has come for `LULL` seconds also without one, `TICKS` a second, for whoever
-    looks. A tick without a frame just before one comes would only hold it up.
+    """Starts a tick as soon as a frame is there, at most `MOST_TICKS` a second.
+
+    When no frame has come for `LULL` seconds, ticks without a frame start, `TICKS` a second, so
+    that the window stays alive. They do not start earlier, because such a tick would delay a frame
+    that arrives during it.
 
     Args:
-        stream: whose frames they are.
+        stream: gives the frames.
         clock: host monotonic time [s].
-        sleep: waits for so many seconds.
+        sleep: sleeps for a number of seconds.
     """
 
     def __init__(
@@ -74,38 +76,38 @@ class OnArrival:
 
 
 class AtOnce:
-    """One tick right after the other, and each has all the time that it takes."""
+    """Starts each tick right after the one before."""
 
     def wait(self) -> None:
         """Return at once."""
 
     def is_due(self) -> bool:
-        """Never: nobody waits for the next tick."""
+        """Return False: the next tick waits for this one."""
         return False
 
 
 class Settling(Protocol):
-    """Surfaces that come nearer to rest between ticks, as those of a `FrameLoop`."""
+    """Surfaces on which the solver can iterate between ticks, as those of a `FrameLoop`."""
 
     def settle(self) -> None:
-        """Bring them nearer to rest."""
+        """Run the iterations that are left."""
         ...
 
     def hurry(self) -> None:
-        """Leave them as they were shown."""
+        """Skip the iterations that are left."""
         ...
 
 
 class SpareTime:
-    """What is left of a tick's time once it has been shown: the surfaces settle in it.
+    """Settles the surfaces in the time that is left after a tick has been shown.
 
-    Where the next tick is due already they do not: a tick that a busy machine held up is not made
-    longer still. They are never left out twice running, so that a show that is always late settles
-    them after every other tick.
+    When the next tick is due already, the surfaces skip it, so that a late tick does not become
+    later. They never skip it twice in a row: a show that is always late settles them after every
+    other tick.
 
     Args:
-        pace: knows when the next tick is due.
-        surfaces: what settles.
+        pace: says whether the next tick is due.
+        surfaces: the surfaces that settle.
     """
 
     def __init__(self, pace: Pace, surfaces: Settling) -> None:
@@ -114,7 +116,7 @@ class SpareTime:
         self._has_settled = True
 
     def spend(self) -> None:
-        """Settle the surfaces if there is time; to be called once a tick."""
+        """Settle the surfaces if there is time; call it once a tick."""
         self._has_settled = not self._has_settled or not self._pace.is_due()
         if self._has_settled:
             self._surfaces.settle()

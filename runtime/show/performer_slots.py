@@ -1,4 +1,4 @@
-"""Which performer drives which characters when several are in view."""
+"""Slots for performers: which of several performers in view drives which characters."""
 
 from __future__ import annotations
 
@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 from devices.skeleton import SkeletonFrame
 
-PATIENCE = 0.5  # seconds that a lost performer's part is kept; sensors lose people for a moment
+PATIENCE = 0.5  # [s] that a slot waits for its performer; sensors lose people for a moment
 
 
 @dataclass(frozen=True, slots=True)
-class _Part:
-    """A part, its performer's number (None while it is free), and when they were last seen [s]."""
+class _Slot:
+    """Number of a slot's performer (None while it is free), and when they were last seen [s]."""
 
     performer: int | None = None
     seen: float = 0.0
@@ -19,47 +19,47 @@ class _Part:
 
 @dataclass(frozen=True, slots=True)
 class PerformerSlotsState:
-    """Which performer has each part, and when they were last seen."""
+    """Which performer has each slot, and when they were last seen."""
 
-    parts: tuple[_Part, ...]
+    slots: tuple[_Slot, ...]
 
 
 class PerformerSlots:
-    """Gives parts to performers in the order in which they come, the lead's first.
+    """Gives slots to performers in the order in which they appear.
 
-    A part stays with its performer, and is free for another when that one has been gone for a
-    while.
+    A performer keeps a slot, and the slot becomes free when the performer has been out of view for
+    `PATIENCE`.
 
     Args:
-        parts: how many there are; one where only the lead drives.
+        count: number of slots; each drives the characters of one performer.
     """
 
-    def __init__(self, parts: int = 1) -> None:
-        self._parts = [_Part() for _ in range(parts)]
+    def __init__(self, count: int = 1) -> None:
+        self._slots = [_Slot() for _ in range(count)]
 
     def snapshot(self) -> PerformerSlotsState:
-        """Return which performer has each part."""
-        return PerformerSlotsState(tuple(self._parts))
+        """Return which performer has each slot."""
+        return PerformerSlotsState(tuple(self._slots))
 
     def restore(self, state: PerformerSlotsState) -> None:
         """Go back to a snapshot."""
-        self._parts = list(state.parts)
+        self._slots = list(state.slots)
 
-    def part(self, frame: SkeletonFrame) -> int | None:
-        """The part that this frame's performer plays; None for a bystander."""
-        played = [part.performer for part in self._parts]
-        if frame.performer in played:
-            number = played.index(frame.performer)
+    def slot(self, frame: SkeletonFrame) -> int | None:
+        """Return the slot of this frame's performer; None if all slots are taken by others."""
+        performers = [slot.performer for slot in self._slots]
+        if frame.performer in performers:
+            number = performers.index(frame.performer)
         else:
-            free = (n for n, part in enumerate(self._parts) if _is_free(part, frame.time))
-            vacant = next(free, None)
-            if vacant is None:
+            free = (n for n, slot in enumerate(self._slots) if _is_free(slot, frame.time))
+            first = next(free, None)
+            if first is None:
                 return None
-            number = vacant
-        self._parts[number] = _Part(frame.performer, frame.time)
+            number = first
+        self._slots[number] = _Slot(frame.performer, frame.time)
         return number
 
 
-def _is_free(part: _Part, time: float) -> bool:
-    """Whether nobody plays a part, or who did has gone; a clock may have been set back."""
-    return part.performer is None or abs(time - part.seen) > PATIENCE
+def _is_free(slot: _Slot, time: float) -> bool:
+    """Whether a slot has no performer, or its performer is gone; a clock may be set back."""
+    return slot.performer is None or abs(time - slot.seen) > PATIENCE

@@ -10,21 +10,21 @@ from typing import Self, TextIO
 
 from tqdm import tqdm
 
-_PATIENCE = 10.0  # [s] before a log or a pipe hears of it
-_STEPS = 10  # lines that a log or a pipe gets, at most
+_PATIENCE = 10.0  # [s] before the first line in a log or a pipe
+_STEPS = 10  # lines in a log or a pipe, at most
 
 
 class Progress:
-    """A bar on a terminal; elsewhere a line at every tenth, once the work proves to be long.
+    """A progress bar on a terminal; elsewhere a line for every tenth of a long work.
 
-    Writes to standard error only, so that standard output can be piped; a reader that goes away
+    It writes to standard error only, so that standard output can be piped. A reader that goes away
     or a closed stream is no error.
 
     Args:
-        label: what is done.
-        total: how many steps it takes, or None when nobody knows.
-        stream: where to write; standard error.
-        clock: tells the time [s].
+        label: the work.
+        total: number of steps, or None if it is not known.
+        stream: where to write; standard error if None.
+        clock: monotonic time [s].
     """
 
     def __init__(
@@ -38,7 +38,7 @@ class Progress:
         self._label, self._total = label, total
         self._stream = sys.stderr if stream is None else stream
         self._clock, self._start = clock, clock()
-        self._done = self._told = 0
+        self._done = self._tenths = 0
         self._bar: tqdm | None = None
         if self._on_terminal():
             self._bar = tqdm(
@@ -46,28 +46,28 @@ class Progress:
             )
 
     def advance(self, steps: int = 1, *, said: str = "") -> None:
-        """Say that `steps` more steps are done, and on a terminal what else is `said`."""
+        """Count `steps` more steps; a terminal shows the text `said` beside the bar."""
         self._done += steps
-        with suppress(OSError, ValueError):  # nobody listens any more, or the stream is closed
+        with suppress(OSError, ValueError):  # the reader is gone, or the stream is closed
             if self._bar is not None:
                 self._bar.set_postfix_str(said, refresh=False)
                 self._bar.update(steps)
             else:
-                self._tell()
+                self._write_tenth()
 
     def close(self) -> None:
-        """Leave the terminal on a fresh line; may be called twice."""
+        """End the bar with a new line; may be called twice."""
         bar, self._bar = self._bar, None
         if bar is not None:
             with suppress(OSError, ValueError):
                 bar.close()
 
-    def _tell(self) -> None:
+    def _write_tenth(self) -> None:
         if not self._total or self._stream is None:
             return
         tenth = min(_STEPS * self._done // self._total, _STEPS)
-        if tenth > self._told and self._clock() - self._start >= _PATIENCE:
-            self._told = tenth
+        if tenth > self._tenths and self._clock() - self._start >= _PATIENCE:
+            self._tenths = tenth
             self._stream.write(f"{self._label}: {100 * tenth // _STEPS} %\n")
             self._stream.flush()
 

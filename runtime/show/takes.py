@@ -1,5 +1,4 @@
-"""Takes: recording a show's performer begins and ends while the show runs, each time into a file of
-its own."""
+"""Takes: recordings that start and end while a show runs, each in a file of its own."""
 
 from __future__ import annotations
 
@@ -12,21 +11,21 @@ from devices.errors import InputError
 from replay.recorded_stream import RecordedStream
 from replay.recorder import Recorder
 
-MOST = 9999  # takes beside one another
+MOST = 9999  # takes in one folder under one name
 
 
 class Takes:
-    """Records a stream whenever it is asked to, and never over a file that is there.
+    """Starts and ends recordings of a stream; never replaces a file.
 
-    A take that cannot be begun is told and the show goes on. Ending one never waits for the disk:
-    what is still to be written goes there from threads of their own, and `close` waits for them.
+    If a take cannot start, a warning says so and the show goes on. Ending a take does not wait for
+    the disk: a thread writes the rest, and `close` waits for it.
 
     Args:
-        stream: what is recorded.
-        path: the takes are called ``take-1.mcap`` and so on, beside ``take.mcap``.
+        stream: the stream to record.
+        path: with ``take.mcap`` the takes are called ``take-1.mcap`` and so on, beside it.
         open_recorder: opens the file of a take.
-        tell: takes one line on what is wrong.
-        waits: whether the stream itself may wait for the disk, so that no frame is lost.
+        tell: takes one line on a fault.
+        waits: whether the stream may wait for the disk, so that no frame is lost.
     """
 
     def __init__(
@@ -48,17 +47,17 @@ class Takes:
 
     @property
     def recording(self) -> bool:
-        """Whether frames go to a file that is all right."""
+        """Whether a take is running without a fault."""
         return self._recorder is not None and not self._recorder.fault
 
     def record(self, recorder: Recorder) -> None:
-        """Let every frame from now on go to `recorder`, which ends with this take."""
+        """Record every frame from now on with `recorder`, which is closed with this take."""
         self.stop()
         self._recorder = recorder
         self._stream.keep = recorder.write if self._waits else recorder.offer
 
     def start(self) -> None:
-        """Begin a take in a file that was not there, unless one is being recorded."""
+        """Start a take in a new file, unless one is running."""
         if self.recording:
             return
         try:
@@ -67,7 +66,7 @@ class Takes:
             self._tell(f"{error}; the show goes on without being recorded")
 
     def stop(self) -> None:
-        """End the take, if one is being recorded."""
+        """End the running take, if there is one."""
         recorder, self._recorder = self._recorder, None
         if recorder is None:
             return
@@ -77,7 +76,7 @@ class Takes:
         self._ending[-1].start()
 
     def close(self) -> None:
-        """End the take and wait until all are written; may be called twice."""
+        """End the running take and wait until all takes are written; may be called twice."""
         self.stop()
         for thread in self._ending:
             thread.join()
@@ -90,7 +89,7 @@ class Takes:
 
 
 def set_aside(path: Path, tell: Callable[[str], None]) -> None:
-    """Give the take that is at `path`, if there is one, a name of its own: it cannot be made again.
+    """Rename an earlier take at `path`, if there is one, so that it is not replaced.
 
     Raises:
         InputError: it cannot be renamed.
@@ -103,11 +102,11 @@ def set_aside(path: Path, tell: Callable[[str], None]) -> None:
     except OSError as error:
         kept.unlink()
         raise InputError(f"cannot rename {path}, an earlier take: {error.strerror}") from error
-    tell(f"{path} was there from earlier and is called {kept.name} now")
+    tell(f"{path} is an earlier take; it is now called {kept.name}")
 
 
 def _fresh(beside: Path) -> Path:
-    """An empty file beside a take, under the first name that nothing had."""
+    """Make an empty file beside a take, under the first free name."""
     for number in range(1, MOST + 1):
         path = beside.with_name(f"{beside.stem}-{number}{beside.suffix}")
         try:

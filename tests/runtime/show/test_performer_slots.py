@@ -14,8 +14,8 @@ def frame(performer: int, time: float) -> SkeletonFrame:
 
 
 def leads(*frames: tuple[int, float]) -> list[bool]:
-    lead = PerformerSlots()
-    return [lead.part(frame(performer, time)) == 0 for performer, time in frames]
+    slots = PerformerSlots()
+    return [slots.slot(frame(performer, time)) == 0 for performer, time in frames]
 
 
 def test_the_first_seen_leads_whoever_else_comes() -> None:
@@ -43,8 +43,8 @@ def test_a_clock_that_is_set_back_far_begins_anew() -> None:
 
 
 def parts(count: int, *frames: tuple[int, float]) -> list[int | None]:
-    lead = PerformerSlots(count)
-    return [lead.part(frame(performer, time)) for performer, time in frames]
+    slots = PerformerSlots(count)
+    return [slots.slot(frame(performer, time)) for performer, time in frames]
 
 
 def test_parts_are_given_in_the_order_of_arrival_and_stay() -> None:
