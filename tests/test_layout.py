@@ -111,6 +111,12 @@ def test_no_import_hidden_in_a_function_breaks_the_rule(room: str) -> None:
         assert imported(path) & set(ROOMS) <= MAY_LOAD[room], path
 
 
+def test_the_library_loads_nothing_before_it_is_used() -> None:
+    everything = EXTRAS | GRAPHICS | {"numba", "numpy", "scipy", "devices", "replay", "solvers"}
+    assert not loaded_by("import runtime; dir(runtime)") & everything
+    assert "numpy" not in loaded_by("from runtime import ShowSettings; ShowSettings()")
+
+
 def test_the_command_line_answers_without_loading_what_a_command_needs() -> None:
     asked = (
         "import contextlib, io, runtime.cli\n"
