@@ -19,12 +19,6 @@ FACES = np.array([[0, 1, 3], [2, 4, 3], [4, 5, 3], [4, 6, 3]], dtype="<u2")
 WEIGHTS = np.array([[1, 0], [1, 0], [1, 0], [0, 1], [0, 1], [1, 0], [0, 1]], dtype="<f4")
 
 
-@pytest.fixture(autouse=True)
-def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("XDG_CACHE_HOME", "LOCALAPPDATA", "HOME"):
-        monkeypatch.setenv(name, str(tmp_path / "cache"))
-
-
 def skinned(path: Path, *, extensions: dict[str, object]) -> Path:
     """A strip of triangles on two joints, in the place where it stands."""
     joints = np.tile(np.array([0, 1, 0, 0], dtype="u1"), (len(CORNERS), 1))

@@ -1,3 +1,5 @@
+"""Mesh files of every format: the same surface, and one line for what is damaged."""
+
 from __future__ import annotations
 
 import struct
@@ -17,12 +19,6 @@ from runtime.characters.palette import linear_from_srgb, palette_color
 TETRAHEDRON = np.array([[0.0, 0, 0], [2, 0, 0], [0, 3, 0], [0, 0, 1.5]])
 FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
 SIGNALLING_NAN = bytes.fromhex("0000817f")  # a float32, which NumPy warns of
-
-
-@pytest.fixture(autouse=True)
-def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("XDG_CACHE_HOME", "LOCALAPPDATA", "HOME"):
-        monkeypatch.setenv(name, str(tmp_path / "cache"))
 
 
 def written(folder: Path, name: str, text: str | bytes) -> Path:

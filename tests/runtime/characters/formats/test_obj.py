@@ -15,20 +15,9 @@ from devices.errors import InputError
 from runtime.characters.character_file import read_character
 from runtime.characters.formats import obj_lines
 from runtime.characters.formats.mesh_file import read_mesh_file
+from tests.runtime.characters.formats.test_mesh_file import written
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
-
-
-@pytest.fixture(autouse=True)
-def _own_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    for name in ("XDG_CACHE_HOME", "LOCALAPPDATA", "HOME"):
-        monkeypatch.setenv(name, str(tmp_path / "cache"))
-
-
-def written(folder: Path, name: str, text: str | bytes) -> Path:
-    path = folder / name
-    path.write_bytes(text if isinstance(text, bytes) else text.encode())
-    return path
 
 
 def test_obj_keeps_the_order_of_its_v_lines_and_reads_relative_corners(tmp_path: Path) -> None:
