@@ -1,17 +1,19 @@
-"""As-rigid-as-possible deformation, warm-started and prefactored, for every frame of a performance.
+"""As-rigid-as-possible (ARAP) deformation of a triangle mesh, fast enough for every live frame.
 
-Sorkine and Alexa 2007, As-rigid-as-possible surface modeling; Chao et al. 2010, A simple geometric
-model for elastic deformations, for the energy with rims. Four things are added.
+Sources: Sorkine and Alexa 2007, As-rigid-as-possible surface modeling; Chao et al. 2010, A simple
+geometric model for elastic deformations, for the energy with rims. The solver adds four things:
 
-- The start. The last answer first moves along with the handles (`solvers.deform.handle_motion`),
-  so that a rigid motion of all handles is the answer at once. After a jump the rest pose, moved
-  along, is taken instead if it is nearer to rigid: a bad frame leaves nothing behind.
-- The unknown. The global step solves for the correction of the positions, from a residual in double
-  precision, so the error of the solve is relative to the correction, not to the character.
-- Rotations that know of each other, where asked for: smooth ones for few handles, and limbs that
-  stay stiff (`solvers.deform.rotation_priors`).
-- The parts that no handle touches. A component without a handle is nobody's to bend: it is carried
-  rigidly by the nearest group of handles, and so is a vertex without a face.
+- A start near the answer. The last answer first moves along with the handles
+  (`solvers.deform.handle_motion`), so a rigid motion of all handles needs no iteration. After a
+  jump the solver also tries the rest pose, moved along, and takes it if its energy is lower. So a
+  bad frame has no effect on later frames (`solvers.deform.rest_pose_trials`).
+- A correction as the unknown. The global step solves for the correction of the positions, from a
+  residual in double precision. The error of the solve is relative to the correction, not to the
+  size of the character.
+- Optional terms between rotations: smooth rotations for few handles, and stiff limbs
+  (`solvers.deform.rotation_priors`).
+- Parts without a handle. The nearest group of handles carries such a component, or a vertex without
+  a face, rigidly (`solvers.deform.carried_parts`).
 """
 
 from __future__ import annotations
@@ -53,7 +55,7 @@ _NO_TURN = np.eye(3).ravel()
 
 
 class ArapSolver:
-    """Deforms a surface so that its handles meet their targets and its cells stay rigid.
+    """Deforms a surface so that its handles meet their targets and its cells stay nearly rigid.
 
     Args:
         vertices: rest positions (N, 3), any unit, finite.
@@ -62,7 +64,8 @@ class ArapSolver:
         handles: vertex indices (H,), at least one, each once.
         energy: "spokes" (Sorkine and Alexa 2007), "spokes-and-rims" (Chao et al. 2010), or
             "smooth-rotations" (Levi and Gotsman 2015), which bends evenly between few handles.
-        groups: which handles move rigidly together, any integers (H,); all of them by default.
+        groups: any integers (H,); handles with the same number move rigidly together. By default
+            all handles are one group.
         weights: how firmly each handle is held (H,); see `hold`.
 
     Raises:
@@ -117,16 +120,17 @@ class ArapSolver:
         groups: ArrayLike | None = None,
         weights: ArrayLike | None = None,
     ) -> None:
-        """Hold these handles from now on instead of those before; the surface stays where it is.
+        """Replace the handles; the surface stays where it is.
 
         Args:
             handles: vertex indices (H,), at least one, each once.
-            groups: which of them move rigidly together, any integers (H,); all by default.
-            weights: how firmly each is held (H,): infinity, the default, where its target is met
-                exactly; 1 for a spring as stiff as the surface around a vertex; 0 lets go.
+            groups: any integers (H,); handles with the same number move rigidly together. By
+                default all handles are one group.
+            weights: how firmly each is held (H,). Infinity, the default, meets the target exactly;
+                1 is a spring as stiff as the surface around a vertex; 0 lets go.
 
         Raises:
-            ValueError: as the constructor; nothing changes then.
+            ValueError: as the constructor; the solver is then unchanged.
         """
         new = checked_handles(handles, groups, weights, self._layout)
         goals = self._x[new.places]
@@ -138,25 +142,25 @@ class ArapSolver:
         self._influence.hold(new)
 
     def weigh(self, weights: ArrayLike) -> None:
-        """Hold the same handles as firmly as `weights` (H,) say from now on.
+        """Change how firmly the handles are held to `weights` (H,), as of `hold`.
 
         Raises:
-            ValueError: for weights of a wrong shape or below zero; nothing changes then.
+            ValueError: for weights of a wrong shape or below zero; the solver is then unchanged.
         """
         self._handles = self._handles.reweighted(weights)
         self._system.hold(self._held())
         self._influence.reweigh(self._handles)
 
     def stiffen(self, region_of: ArrayLike, rigidity: ArrayLike) -> None:
-        """Name the parts of the surface that `stiffness` keeps from bending.
+        """Define the parts of the surface that `stiffness` keeps from bending.
 
         Args:
-            region_of: (N,) integers, which part each vertex belongs to.
-            rigidity: (N,) in [0, 1], how much of the stiffness each takes: 1 within a limb, falling
-                to 0 where it may bend; see `solvers.deform.stiff_segments`.
+            region_of: (N,) integers, the part of each vertex.
+            rigidity: (N,) in [0, 1], the share of the stiffness at each vertex: 1 within a limb, 0
+                where the surface may bend; see `solvers.deform.stiff_segments`.
 
         Raises:
-            ValueError: for wrong shapes or a rigidity out of range; nothing changes then.
+            ValueError: for wrong shapes or a rigidity out of range; the solver is then unchanged.
         """
         regions, shares = checked_regions(region_of, rigidity, len(self._x))
         order = self._layout.order
@@ -164,7 +168,7 @@ class ArapSolver:
 
     @property
     def stiffness(self) -> float:
-        """How stiff the parts named by `stiffen` are, in [0, 1); 0 costs nothing."""
+        """How stiff the parts defined by `stiffen` are, in [0, 1); 0 costs no time."""
         return self._priors.stiffness
 
     @stiffness.setter
@@ -194,10 +198,10 @@ class ArapSolver:
         )
 
     def restore(self, state: DeformationState) -> None:
-        """Go back to a snapshot: the next solves give the same bytes as those after it did.
+        """Go back to a snapshot; the next solves return the same bytes as after the snapshot.
 
-        The handles of that time are held again, which factors the system if others are held now.
-        `flatten_folds` lays flat what the next solve gives.
+        The handles and weights of the snapshot are held again. If others are held now, the system
+        is factored again. `flatten_folds` may be called after the next solve.
 
         Raises:
             ValueError: a snapshot of a surface with another number of vertices; nothing changes.
@@ -222,11 +226,11 @@ class ArapSolver:
     def solve(
         self, targets: ArrayLike, iterations: int = 1, *, out: Floats | None = None
     ) -> Floats:
-        """Vertices (N, 3) that bring the handles to `targets` (H, 3), the hard ones exactly.
+        """Return vertices (N, 3) whose handles are at `targets` (H, 3); hard handles exactly.
 
-        Starts from the last answer, moved along with the handles, and takes `iterations` local and
-        global steps from there; zero gives the start itself. The answer is put into `out` where
-        one is given, and is a new array otherwise.
+        The solver starts from the last answer, moved along with the handles, and takes `iterations`
+        local and global steps; zero returns the start itself. The answer is written to `out` if
+        given, else to a new array.
 
         Raises:
             ValueError: for targets of a wrong shape, not finite, or absurdly far away.
@@ -248,10 +252,10 @@ class ArapSolver:
         return answer
 
     def settle(self, iterations: int = 1) -> None:
-        """Take `iterations` more steps to the targets of the last solve, whose answer is out.
+        """Take `iterations` more steps towards the targets of the last solve.
 
-        For the time between two frames: the next solve starts from there. What a solve would now
-        and then have to do first, trying the rest pose, is done here.
+        Call it between two frames, after the answer is shown: the next solve then starts nearer to
+        its answer. A trial of the rest pose that is due is done here, not in the next solve.
         """
         with threads_for(len(self._x)):
             share = self._trials.share_between_frames()
@@ -263,19 +267,19 @@ class ArapSolver:
 
     @property
     def energy(self) -> float:
-        """The energy of the last answer under its best rotations, in the vertices' unit squared."""
+        """The energy of the last answer with its best rotations, in the vertices' unit squared."""
         rotations = self._R.copy()
         energy = self._energy_of(self._x)
         self._R[:] = rotations
         return energy * self._box.size**2
 
     def flatten_folds(self, answer: Floats) -> int:
-        """Lay flat what is folded in the answer (N, 3) that the last solve gave, in place.
+        """Flatten the folded triangles of the last solve's answer (N, 3), in place.
 
-        What goes on to the next frame is left as it is: see `solvers.deform.creases`.
+        The solver's own state does not change: see `solvers.deform.creases`.
 
         Returns:
-            How many triangles were folded.
+            The number of folded triangles.
         """
         box, order = self._box, self._layout.order
         self._from_rest[:] = self._shown
@@ -291,7 +295,7 @@ class ArapSolver:
         return self._creases
 
     def rotations(self) -> Floats:
-        """How each vertex's cell was turned by the last iteration, (N, 3, 3)."""
+        """Return the rotation of each vertex's cell after the last iteration, (N, 3, 3)."""
         return self._R[self._layout.place].reshape(-1, 3, 3)
 
     def _local_step(self, x: Floats) -> None:
@@ -319,7 +323,7 @@ class ArapSolver:
         return self._x
 
     def _move_along(self, goals: Floats) -> None:
-        """Put the start of this frame's iterations into x: hard handles at their goals, (H, 3)."""
+        """Move x to the start of this frame's iterations, with hard handles at goals (H, 3)."""
         influence = self._influence
         influence.advance()
         step = influence.motions(self._goals, goals)
@@ -336,7 +340,7 @@ class ArapSolver:
         self._trials = self._trials.after_solve()
 
     def _try_from_rest(self, goals: Floats, share: float) -> None:
-        """Start from the rest pose, moved along, if its energy is under a share of that of x."""
+        """Replace x by the rest pose, moved along, if that has less than a share of x's energy."""
         self._trials = self._trials.after_trial()
         if self._trials.is_fresh:  # x is that already
             return
@@ -357,13 +361,13 @@ class ArapSolver:
                 self._R, self._R_aside = self._R_aside, self._R
 
     def _put_held(self, goals: Floats, x: Floats) -> None:
-        """Put what is not free into x: hard handles at their goals, carried parts beside theirs."""
+        """Move hard handles in x to their goals (H, 3), and carried parts with their groups."""
         handles = self._handles
         x[handles.places[handles.hard]] = goals[handles.hard]
         self._carried.move(self._rest, handles, goals, x)
 
     def _energy_of(self, x: Floats) -> float:
-        """The energy of x and of the rotations that the next local step finds for it."""
+        """The energy of x with the rotations of its next local step."""
         self._local_step(x)
         return self._sum_terms(x) + self._priors.energy(self._R)
 
@@ -381,15 +385,15 @@ def _area(points: Floats, faces: Ints) -> float:
 
 
 def warm() -> None:
-    """Compile what a performance will call, so that no frame waits for it; it is cached on disk.
+    """Compile the kernels of the solver before a show, so that no frame waits for the compiler.
 
-    Takes under a minute on a fresh machine, a moment after that.
+    The compiled code is cached on disk. The first call takes under a minute, later calls a moment.
     """
     grid = np.stack(np.meshgrid(np.arange(9.0), np.arange(9.0), [0.0]), axis=-1).reshape(-1, 3)
     a = (np.arange(8)[:, None] * 9 + np.arange(8)).ravel()
     faces = np.concatenate([np.stack([a, a + 1, a + 10], 1), np.stack([a, a + 10, a + 9], 1)])
     solver = ArapSolver(grid, faces, [0, 8, 72, 80])
-    solver.solve(grid[[0, 8, 72, 80]][::-1], 1)  # a jump, which compiles the energy too
+    solver.solve(grid[[0, 8, 72, 80]][::-1], 1)  # a jump compiles the energy too
     solver = ArapSolver(grid, faces, [0, 8, 72, 80], energy=SMOOTH_ROTATIONS)
     solver.stiffen(np.zeros(81, dtype=np.int64), np.ones(81))
     solver.stiffness = 0.5

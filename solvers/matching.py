@@ -1,21 +1,22 @@
-"""Ranks the parts of a character that a performer's pose resembles on the screen.
+"""Ranks the parts of a character by their similarity to a performer's pose on the screen.
 
 Source: AniMesh (Jin et al. 2015), section 4.2 and figure 3g.
 
-Both trees are moved so that their roots coincide, scaled so that the longest branch has length one
-and projected to the screen. A match's score is the paper's: the sum, over the pairs of branches, of
-the cosine of the angle between them. A branch that (after the scaling) is nearly perpendicular to
-the screen has no angle there; its cosine fades to 0 as its picture gets shorter than `_FADE`.
+Both trees are moved so that their roots coincide, scaled so that the longest branch has length one,
+and projected to the screen. The score of a match is the paper's: the sum, over the pairs of
+branches, of the cosine of the angle between them. A branch that is nearly perpendicular to the
+screen (after the scaling) has no angle there; its cosine fades to 0 as its picture gets shorter
+than `_FADE`.
 
-A performer with several branching places (a body: shoulders and hips) also meets the unfolded
-sub-trees of `abstraction`, and then what lies between the places is paired as well: pelvis to chest
-with the same stretch on the character. Those inner pairs carry no score.
+A performer with several forks (a body: shoulders and hips) is also matched with the unfolded
+sub-trees of `abstraction`. Then the chains between the forks are paired as well: pelvis to chest
+with the same chain of the character. These inner pairs have no score.
 
-More pairs can make a larger sum, so where a part of the character can take all of the performer's
-branches, it wins over one that can take fewer. With `size_preference` = 0 the order is that of the
-scores; above 0 each pair is worth that much more if its target chain is at least a third as long
-as the character's longest, and proportionally less below: limbs win over spurs that happen to
-point the same way, and a tail does not win over a leg.
+More pairs can give a larger sum. So a part of the character that can take all of the performer's
+branches comes before a part that can take fewer. With `size_preference` = 0 the order is that of
+the scores. Above 0 each pair adds that much to the merit if its target chain is at least a third as
+long as the character's longest, and proportionally less if it is shorter. So limbs come before
+spurs of the same direction, and a tail does not come before a leg.
 """
 
 from __future__ import annotations
@@ -40,9 +41,9 @@ Chain = tuple[int, ...]
 # A match's pairs, limbs, stops, root and level.
 _Plan = tuple[tuple[tuple[Chain, Chain], ...], int, tuple[int, ...], int, int]
 
-SIZE_PREFERENCE: Final = 0.8  # suits a live show, where the part that moves should be seen
+SIZE_PREFERENCE: Final = 0.8  # for a live show, where the audience should see the moving part
 _FADE: Final = 0.05  # of the longest branch
-_REMEMBERED: Final = 4096  # matches whose chains are kept ready
+_REMEMBERED: Final = 4096  # matches whose chains are cached
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,12 +54,12 @@ class Match:
         score: sum of the cosines over the first `limbs` pairs, at most `limbs`.
         pairs: chains of source and of target nodes, from the root outward; first the limbs (target
             chains extended to a leaf, figure 5 right), then the inner chains between their roots.
-        limbs: how many pairs are limbs.
-        stops: for each pair how many nodes of its target chain lead up to the abstracted sub-tree's
-            root (figure 5 middle).
+        limbs: the number of pairs that are limbs.
+        stops: for each pair the number of target nodes up to the abstracted sub-tree's root
+            (figure 5 middle).
         root: target node that stays in place; all target chains lead away from it.
         level: level of detail of the sub-tree, from 1 (small parts) up.
-        merit: what the list is ordered by: the score and, if asked for, the preference for size.
+        merit: the key of the order: the score plus the preference for size.
     """
 
     score: float
@@ -70,7 +71,7 @@ class Match:
     merit: float
 
     def stopped(self) -> Match:
-        """The same match with its target chains stopping at the sub-trees' roots."""
+        """Return the same match with target chains that stop at the sub-trees' roots."""
         stopped = tuple(
             (source, target[:stop])
             for (source, target), stop in zip(self.pairs, self.stops, strict=True)
@@ -80,7 +81,7 @@ class Match:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Candidates:
-    """The sub-trees that sources of one kind are compared with, their branches side by side."""
+    """The sub-trees that are compared with sources of one kind, and all their branches."""
 
     subtrees: tuple[SubTree, ...]
     starts: NDArray[np.int64]  # (C + 1,)
@@ -89,11 +90,11 @@ class _Candidates:
 
 
 class TargetHierarchy:
-    """A character's skeleton, taken apart once, to be matched in every frame.
+    """A character's skeleton with its sub-trees, prepared once for matching in every frame.
 
     Args:
         tree: the character's skeleton at rest.
-        root: node to take as the hierarchy's root; found if not given.
+        root: the hierarchy's root; found if not given.
     """
 
     def __init__(self, tree: Tree, root: int | None = None) -> None:
@@ -114,14 +115,14 @@ class TargetHierarchy:
         source_view: ArrayLike | None = None,
         size_preference: float = 0.0,
     ) -> list[Match]:
-        """Matches with a performer's pose, best first.
+        """Return matches with a performer's pose, best first.
 
         Args:
-            source: the performer's skeleton, simplified once.
+            source: the performer's simplified skeleton.
             view: (3, 3) rotation from the stage to the camera (x right, y up, z to the viewer).
-            positions: (J, 3) the joints now, finite; the skeleton's rest if not given.
-            limit: how many at most.
-            source_view: (3, 3) as `view`, for the capture device; seen straight on if not given.
+            positions: (J, 3) the joints' positions, finite; the skeleton's rest if not given.
+            limit: the most matches.
+            source_view: (3, 3) as `view`, for the capture device; the identity if not given.
             size_preference: see the module.
 
         Source: AniMesh, section 4.2.
@@ -135,7 +136,7 @@ class TargetHierarchy:
         seen = _on_screen(source.branch_vectors(pose) / max(source.length, 1e-300), source_view)
         cosines = seen @ _on_screen(candidates.vectors, view).T
         sizes = size_preference * candidates.sizes
-        # Two unfoldings can hold the same match: then ask for more, and keep the first of each.
+        # Two unfoldings can contain the same match: rank more, and keep the first of each.
         more = 2 if any(subtree.unfolding for subtree in candidates.subtrees) else 1
         taken, columns, merits = rank_assignments(cosines + sizes, candidates.starts, more * limit)
         preferred = np.where(columns < 0, 0.0, sizes[candidates.starts[taken, None] + columns])
@@ -147,7 +148,7 @@ class TargetHierarchy:
             plan, number = self._plan(source, candidates.subtrees[which], tuple(row))
             if number not in matches:
                 matches[number] = Match(score, *plan, merit)
-        # Equal up to rounding may have come in any order.
+        # Scores that are equal up to rounding may be in any order.
         return sorted(matches.values(), key=lambda match: -match.merit)[:limit]
 
     def _for(self, branches: int, several_forks: bool) -> _Candidates:
@@ -159,7 +160,7 @@ class TargetHierarchy:
     def _plan(
         self, source: SimplifiedSource, subtree: SubTree, columns: Chain
     ) -> tuple[_Plan, int]:
-        """A match without its score, worked out once, and a number that tells it from others."""
+        """A match without its score, from a cache, and a number that identifies it."""
         if source is not self._source or len(self._plans) >= _REMEMBERED:
             self._source = source
             self._plans.clear()
@@ -189,9 +190,9 @@ def rank_matches(
         source: the performer's joints as they are posed, seen straight on (x right, y up).
         target: the character's skeleton.
         view: (3, 3) rotation from the stage to the target's camera (x right, y up, z to viewer).
-        limit: how many matches at most.
+        limit: the most matches.
         source_view: (3, 3) as `view`, for the source.
-        size_preference: worth of a full-sized limb over a spur; 0 orders by the score alone.
+        size_preference: merit of a full-sized limb over a spur; 0 orders by the score alone.
 
     Source: AniMesh (Jin et al. 2015), section 4.
     """
@@ -222,8 +223,8 @@ def _gather(
 ) -> _Candidates:
     """The candidates for sources with so many branches.
 
-    A sub-tree as the paper folds it always is one; unfolded, where it has too few branches
-    otherwise, or as far as the body plan where the source has several branching places.
+    A sub-tree as the paper folds it is always a candidate. Unfolded, it is one if the coarser
+    unfolding has too few branches, or, within the body plan, if the source has several forks.
     """
     chosen = [
         _largest(subtree)
@@ -249,7 +250,7 @@ def _gather(
 
 
 def _largest(subtree: SubTree) -> SubTree:
-    """At most `MOST_COLUMNS` branches, the longest, in their order."""
+    """The sub-tree with at most `MOST_COLUMNS` branches, the longest, in their order."""
     if len(subtree.branches) <= MOST_COLUMNS:
         return subtree
     kept = sorted(subtree.branches, key=lambda branch: -branch.length)[:MOST_COLUMNS]
@@ -257,7 +258,7 @@ def _largest(subtree: SubTree) -> SubTree:
 
 
 def _plan(tree: Tree, source: SimplifiedSource, subtree: SubTree, columns: Chain) -> _Plan:
-    """The chains that a choice of branches drives; `columns` gives each source branch's branch."""
+    """The chains driven by a choice of branches; `columns` is the branch of each source branch."""
     limbs = [
         (chain, subtree.branches[column])
         for chain, column in zip(source.chains, columns, strict=True)
@@ -281,8 +282,8 @@ def _place_forks(
 ) -> dict[int, int]:
     """For each source fork the target node where its limbs meet, seen from the sub-tree's root.
 
-    A fork that carries no matched limb lies where those that hang on it meet. The source fork
-    nearest to the performer's root comes first.
+    A fork without a matched limb lies where the forks below it meet. The source fork nearest to the
+    performer's root comes first.
 
     Args:
         tree: the target.
@@ -292,7 +293,7 @@ def _place_forks(
     """
     places: dict[int, int] = {}
     hanging: dict[int, list[int]] = {fork: [] for fork in source.forks}
-    for fork in reversed(source.forks):  # those further out first
+    for fork in reversed(source.forks):  # outer forks first
         own = [target for carries, target in hang if carries == fork]
         below = hanging[fork]
         if own or len(below) > 1:
@@ -307,7 +308,7 @@ def _place_forks(
 def _inner_pairs(
     tree: Tree, source: SimplifiedSource, places: dict[int, int]
 ) -> list[tuple[Chain, Chain]]:
-    """The stretches between forks that both sides have, those nearer to the root first."""
+    """The chains between forks that exist on both sides, the nearest to the root first."""
     root = next(iter(places.values()))
     driven: set[tuple[int, int]] = set()
     pairs: list[tuple[Chain, Chain]] = []
@@ -332,7 +333,7 @@ def _next_above(source: SimplifiedSource, fork: int, among: Container[int]) -> i
 
 
 def _meet(tree: Tree, root: int, nodes: Sequence[int]) -> int:
-    """The node where the ways from `root` to all of `nodes` part."""
+    """The last node that the chains from `root` to all of `nodes` have in common."""
     ways = [tree.chain(root, node) for node in nodes]
     shared = 0
     while all(len(way) > shared and way[shared] == ways[0][shared] for way in ways):

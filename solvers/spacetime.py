@@ -1,22 +1,23 @@
-"""Trajectories of a performer's joints carried over to a character's control points, by example.
+"""Transfers whole trajectories of joints to a character's control points, from example poses.
 
-A few pairs of poses say where each control point is when its joint is there. In every frame a joint
-is written as an affine combination of its examples, and its control point is the same combination
-of its own. All frames are found at once, so that the path is smooth and meets constraints exactly.
+Pairs of example poses give the position of each control point for a position of its joint. In every
+frame a joint is an affine combination of its examples, and its control point is the same
+combination of its own examples. All frames are solved at once, so the path is smooth and meets
+constraints exactly.
 
 Source: Celikcan, Yaz and Capin 2015, section 5, equations 14 to 25.
 
-The paper takes four examples a frame, for which equation 14 has one solution. Where those lie
-nearly in a plane it flings the path about, and the path jumps where others become nearest. Here all
-examples take part, and of the many solutions the one of least norm is taken, weighted by nearness:
-moving least squares (Levin 1998), which meets the examples, is smooth between them, and carries
-affine maps over; a ridge keeps examples that lie in a plane from telling of what is across it. The
-paper's system is then solved about those weights. Its unknowns, a weight for each example in each
-frame, matter only by the control points that they give, so these are solved for: what the weights
-cost says how freely each point may move, (3, 3) in each frame.
+The paper uses four examples a frame, for which equation 14 has one solution. If these four lie
+nearly in a plane, that solution varies wildly, and the path jumps where other examples become the
+nearest. Here all examples are used, and of the many solutions the one with the least norm, weighted
+by nearness: moving least squares (Levin 1998). It meets the examples, is smooth between them, and
+reproduces affine maps. A ridge damps the direction across examples that lie in a plane. The paper's
+system is then solved around these weights. Its unknowns, a weight for each example in each frame,
+affect only the control points, so the control points are the unknowns here. The cost of the weights
+becomes a covariance (3, 3) of each point in each frame: how freely the point may move.
 
-Joints and control points are each measured from the middle of their own examples, in units of how
-far those spread, so that neither units nor the choice of an origin matter.
+Joints and control points are measured from the mean of their own examples, in units of the
+examples' spread. So neither units nor the choice of an origin matter.
 """
 
 from __future__ import annotations
@@ -32,24 +33,24 @@ from scipy.linalg import solveh_banded
 from scipy.sparse.linalg import splu
 
 ACCELERATION: Final = 0.3  # the paper's weight of smoothness, lambda_A
-_RIDGE = 1e-2  # of the examples' extent: as flat as that they tell nothing of what is across
-_PULL = 1e-2  # cost of a weight that departs from moving least squares, times the nearness
-_FARTHEST = 1e-4  # nearness of those that a joint at an example does not come near
-_SLACK = 1e-10  # of a constraint while factorising; refined away afterwards
+_RIDGE = 1e-2  # of the examples' extent: flatter examples give no motion across their plane
+_PULL = 1e-2  # cost of a weight that differs from moving least squares, times the nearness
+_FARTHEST = 1e-4  # the least nearness of an example
+_SLACK = 1e-10  # of a constraint in the factor; iterative refinement removes it
 _REFINEMENTS = 3
-_MET = 1e-6  # of the examples' spread; what misses a constraint by more cannot meet it
+_MET = 1e-6  # of the examples' spread; a larger error means that a constraint cannot be met
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, slots=True)
 class Constraint:
-    """What control points must meet exactly: sum of factor * position = value.
+    """A linear condition that control points meet exactly: sum of factor * position = value.
 
     Attributes:
         terms: frame, joint and factor of each position in the sum.
         value: one number for each axis, in the control points' unit.
-        axes: which of x, y, z (0, 1, 2) it is said of.
+        axes: the axes x, y, z (0, 1, 2) for which it holds.
     """
 
     terms: tuple[tuple[int, int, float], ...]
@@ -60,14 +61,14 @@ class Constraint:
 def position_constraint(
     frame: int, joint: int, position: Sequence[float], axes: Sequence[int] = (0, 1, 2)
 ) -> Constraint:
-    """A control point is at `position`, one number for each of `axes` (equation 22)."""
+    """Return: a control point is at `position`, one number for each of `axes` (equation 22)."""
     return Constraint(((frame, joint, 1.0),), tuple(map(float, position)), tuple(axes))
 
 
 def velocity_constraint(
     frame: int, joint: int, velocity: Sequence[float], axes: Sequence[int] = (0, 1, 2)
 ) -> Constraint:
-    """A control point moves by `velocity` from the frame before to this one (equation 23)."""
+    """Return: a control point moves by `velocity` from the last frame to this one (equation 23)."""
     terms = (frame, joint, 1.0), (frame - 1, joint, -1.0)
     return Constraint(terms, tuple(map(float, velocity)), tuple(axes))
 
@@ -75,7 +76,7 @@ def velocity_constraint(
 def equality_constraint(
     frame: int, joint: int, other: int, axes: Sequence[int] = (1,)
 ) -> Constraint:
-    """Two control points agree on `axes`, as where one takes over the ground from another."""
+    """Return: two control points are equal on `axes`, as when one foot replaces the other."""
     terms = (frame, joint, 1.0), (frame, other, -1.0)
     return Constraint(terms, (0.0,) * len(axes), tuple(axes))
 
@@ -88,24 +89,24 @@ def retarget_trajectories(
     acceleration: float = ACCELERATION,
     constraints: Sequence[Constraint] = (),
 ) -> Array:
-    """Paths of control points that do what joints do, as examples show.
+    """Return paths of control points that follow joints as in the examples.
 
-    Where a joint rests at one of its examples its control point rests at the pair of it. Moving or
-    turning all examples and the path of the joints, or scaling them, changes nothing.
+    Where a joint rests at one of its examples, its control point rests at the paired example. A
+    rotation, translation or scaling of all joints, examples and path, does not change the result.
 
     Args:
-        joint_examples: (E, J, 3) where the joints are in each example, in the performer's frame.
-        control_examples: (E, J, 3) where their control points are, in the character's frame.
-        joint_path: (T, J, 3) where the joints are in each frame, as the examples of them.
-        acceleration: the weight of smoothness, lambda_A; 0 takes each frame by itself.
-        constraints: what the paths must meet exactly.
+        joint_examples: (E, J, 3) positions of the joints in each example, in the performer's frame.
+        control_examples: (E, J, 3) positions of their control points, in the character's frame.
+        joint_path: (T, J, 3) positions of the joints in each frame, as in `joint_examples`.
+        acceleration: the weight of smoothness, lambda_A; 0 treats each frame by itself.
+        constraints: conditions that the paths meet exactly.
 
     Returns:
-        (T, J, 3) where the control points are in each frame, as the examples of them.
+        (T, J, 3) positions of the control points in each frame, as in `control_examples`.
 
     Raises:
         ValueError: for wrong shapes, numbers that are not finite, an acceleration below zero, or a
-            constraint that names what is not there or that these examples cannot meet.
+            constraint that names a missing frame or joint or that these examples cannot meet.
     """
     joints, controls, path = _checked(joint_examples, control_examples, joint_path)
     if not (np.isfinite(acceleration) and acceleration >= 0.0):
@@ -125,13 +126,13 @@ def retarget_trajectories(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Guide:
-    """Where one control point should be, and how freely it may be elsewhere.
+    """The preferred path of one control point, and how freely the point may leave it.
 
     Attributes:
-        path: (T, 3) each frame by itself.
+        path: (T, 3) of each frame by itself.
         freedom: (T, 3, 3) covariance of each frame.
-        stiffness: what an acceleration is multiplied with.
-        spread: how far the control point's examples lie from their middle.
+        stiffness: the factor of an acceleration.
+        spread: root mean square distance of the control point's examples from their mean.
     """
 
     path: Array
@@ -152,7 +153,7 @@ def _guide(joints: Array, controls: Array, path: Array, acceleration: float) -> 
 
 
 def _measure(points: Array) -> tuple[Array, float]:
-    """The middle of points (E, 3), and their root mean square distance from it; 1 for one spot."""
+    """The mean of points (E, 3), and their root mean square distance from it; 1 for one place."""
     middle = points.mean(axis=0)
     spread = float(np.sqrt(np.mean(np.sum((points - middle) ** 2, axis=1))))
     return middle, spread if spread > 1e-12 * float(np.abs(points).max()) else 1.0
@@ -181,8 +182,8 @@ def _combine(examples: Array, path: Array) -> tuple[Array, Array]:
 def _freedom(joints: Array, controls: Array, nearness: Array) -> Array:
     """How freely a control point may move in each frame, (T, 3, 3): C P^-1 C'.
 
-    P = J'J + pull / nearness is what weights that depart from those of `_combine` cost; its inverse
-    takes only 4 x 4 systems (Woodbury).
+    P = J'J + pull / nearness is the cost of weights that differ from those of `_combine`; its
+    inverse needs only 4 x 4 systems (Woodbury).
     """
     J = np.concatenate([joints.T, np.ones((1, len(joints)))])  # equation 14
     loose = np.maximum(nearness, _FARTHEST)[:, None, :] / _PULL
@@ -195,7 +196,7 @@ def _freedom(joints: Array, controls: Array, nearness: Array) -> Array:
 
 
 def _smooth(guide: _Guide) -> Array:
-    """The path (T, 3) that nothing constrains: the guide's, with less acceleration."""
+    """The path (T, 3) without constraints: the guide's, with less acceleration."""
     frames = len(guide.path)
     if frames < 3 or guide.stiffness == 0.0:
         return guide.path
@@ -204,7 +205,7 @@ def _smooth(guide: _Guide) -> Array:
     blocks = [S[:-2] + 4.0 * S[1:-1] + S[2:], -2.0 * (S[1:-2] + S[2:-1]), S[2:-2]]
     blocks[0] += np.eye(3)
     pushes = solveh_banded(_banded(blocks), steps.ravel(), lower=True, check_finite=False)
-    padded = np.zeros((frames + 2, 3))  # so that its differences are those across
+    padded = np.zeros((frames + 2, 3))  # so that its differences are the transposed ones
     padded[2:-2] = guide.stiffness**2 * pushes.reshape(-1, 3)
     moved: Array = np.matmul(guide.freedom, np.diff(padded, 2, axis=0)[:, :, None])[:, :, 0]
     return guide.path - moved
@@ -258,14 +259,14 @@ def _meet(guides: Mapping[int, _Guide], constraints: Sequence[Constraint]) -> di
 
 
 def _along_diagonal(blocks: Array) -> sp.bsr_matrix:
-    """A matrix with these (T, 3, 3) along its diagonal."""
+    """A matrix with blocks (T, 3, 3) along its diagonal."""
     return sp.bsr_matrix((blocks, np.arange(len(blocks)), np.arange(len(blocks) + 1)))
 
 
 def _rows(
     places: Mapping[int, int], frames: int, constraints: Sequence[Constraint]
 ) -> tuple[sp.csr_matrix, Array]:
-    """What constraints say of all paths: a row and a value for each of their axes."""
+    """The constraints on all paths: a row and a value for each of their axes."""
     data: list[tuple[float, int, int]] = []
     values: list[float] = []
     for constraint in constraints:

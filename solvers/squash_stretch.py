@@ -1,24 +1,24 @@
-"""Squash and stretch: a surface whose cells scale and keep their volume.
+"""Squash and stretch: ARAP deformation whose cells may scale while the volume is kept.
 
-Celikcan, Yaz and Capin 2015, section 4. Two states share one factor:
+Source: Celikcan, Yaz and Capin 2015, section 4. Two states share one factor:
 
-- The shape state. Cells rotate and scale uniformly, eqs. (4) to (9). It is what goes on from frame
-  to frame; nothing of the pose ever comes back into it, so nothing drifts.
-- The pose state, once a frame. Each cell is squashed along its primary axis by what the shape state
-  found there, and swells across it so that its volume stays: eqs. (10) to (13).
+- The shape state. Cells rotate and scale uniformly, eqs. (4) to (9). This state continues from
+  frame to frame. The pose state never changes it, so nothing drifts.
+- The pose state, once a frame. Each cell is scaled along its primary axis as the shape state found,
+  and across the axis so that the cell's volume stays: eqs. (10) to (13).
 
-Where the paper is left, and why:
+Differences from the paper:
 
-- The primary axis is sought in the cell's own plane, as the larger of the two principal stretches
-  of its rest edges, in place of the first eigenvector of eq. (11). They are the same where a cell
-  is stretched; where it is only bent, eq. (11) finds the normal, and along it no edge has a length
-  to be scaled. It is a closed form on two by two numbers.
-- Where both stretches are nearly as large, which is where energy (4) leads to (a conformal map is
-  free), an axis would flicker: the scale is then shared between both axes, smoothly.
-- What the pose still lacks in volume is given back by a pressure. Held ends, and cells that shrink
-  as they may in eq. (4), lose a third of the volume of a squashed box whatever eq. (13) asks for.
-  The pressure acts where cells are squashed or stretched and nowhere else, in proportion to the
-  strain, so that the parts at rest stay as they are: no balloon effect (the paper's figure 6).
+- The primary axis lies in the cell's own plane. It is the direction of the larger of the two
+  principal stretches of the cell's rest edges, not the first eigenvector of eq. (11). Both agree
+  where a cell is stretched. Where a cell only bends, eq. (11) finds the normal, along which no rest
+  edge has a length to scale. The two principal stretches have a closed form (2 x 2).
+- Energy (4) makes both stretches nearly equal (a conformal map costs nothing), so the axis would
+  flicker. The scale is then shared between both axes, smoothly.
+- A pressure restores the volume that the pose still lacks. Held ends, and cells that shrink as
+  eq. (4) allows, lose a third of the volume of a squashed box in spite of eq. (13). The pressure
+  acts only where cells are strained, in proportion to the strain. Parts at rest stay as they are:
+  no balloon effect (the paper's figure 6).
 """
 
 from __future__ import annotations
@@ -55,14 +55,14 @@ _LARGEST_GAIN = 10.0
 
 
 class SquashStretchSolver(ArapSolver):
-    """Deforms a surface like `ArapSolver`, but lets it squash and stretch, and keeps its volume.
+    """Deforms a surface like `ArapSolver`, but its cells may scale and its volume is kept.
 
     Args:
         vertices, faces, handles, energy, groups, weights: as of `ArapSolver`.
-        volume_gain: how much of the volume that squash and stretch would cost is kept, the paper's
-            lambda_v: 0 none, 1 all of it, more for exaggeration; may be changed between solves.
-        cartoon: 0 for the rigid answer of `ArapSolver`, bit for bit, 1 for squash and stretch, or
-            anything between; may be changed between solves.
+        volume_gain: the share of the volume lost by squash and stretch that is restored, the
+            paper's lambda_v: 0 none, 1 all, more exaggerates; may be changed between solves.
+        cartoon: 0 for the rigid answer of `ArapSolver`, bit for bit, 1 for squash and stretch, or a
+            value between; may be changed between solves.
 
     Raises:
         ValueError: as `ArapSolver`, and for a gain outside [0, 10] or a cartoon outside [0, 1].
@@ -107,7 +107,7 @@ class SquashStretchSolver(ArapSolver):
 
     @property
     def volume_gain(self) -> float:
-        """How much of the lost volume is kept: 0 none, 1 all, more for exaggeration."""
+        """The share of the lost volume that is restored: 0 none, 1 all, more exaggerates."""
         return self._volume_gain
 
     @volume_gain.setter
@@ -130,10 +130,10 @@ class SquashStretchSolver(ArapSolver):
     def solve(
         self, targets: ArrayLike, iterations: int = 1, *, out: Floats | None = None
     ) -> Floats:
-        """Vertices (N, 3) that bring the handles to `targets` (H, 3), the hard ones exactly.
+        """Return vertices (N, 3) whose handles are at `targets` (H, 3); hard handles exactly.
 
-        The last iteration is the pose state's, those before are the shape state's; a single one
-        stands for one of each. Zero gives the start itself. `out` as of `ArapSolver.solve`.
+        The last iteration is the pose state's, all others are the shape state's. One iteration is
+        one of each. Zero returns the start itself. `out` as of `ArapSolver.solve`.
 
         Raises:
             ValueError: as of `ArapSolver.solve`.
@@ -150,22 +150,23 @@ class SquashStretchSolver(ArapSolver):
     def snapshot(self) -> DeformationState:
         """Return what the next solve depends on, as of `ArapSolver.snapshot`.
 
-        The pose state is found anew in each frame and is no part of it.
+        Each solve computes the pose state from the shape state, so the snapshot leaves it out.
         """
         return replace(super().snapshot(), cell_scales=self._cell_scales.copy())
 
     def restore(self, state: DeformationState) -> None:
         """Go back to a snapshot, as of `ArapSolver.restore`.
 
-        `scales` and `cell_matrices` are those of the next solve.
+        `scales` and `cell_matrices` are valid again after the next solve.
         """
         super().restore(state)
         self._cell_scales[:] = 1.0 if state.cell_scales is None else state.cell_scales
 
     @property
     def energy(self) -> float:
-        """Eq. (4) of the shape state under its best rotations and scales, and the terms that are
-        on between rotations, in the vertices' unit squared.
+        """The energy (4) of the shape state with its best rotations and scales.
+
+        It includes the active terms between rotations; in the vertices' unit squared.
         """
         kept = self._R.copy(), self._cell_scales.copy()
         self._local_step(self._x)
@@ -176,23 +177,23 @@ class SquashStretchSolver(ArapSolver):
         return energy * self._box.size**2
 
     def rotations(self) -> Floats:
-        """How each vertex's cell was turned by the last iteration, without its scale, (N, 3, 3)."""
+        """Return each cell's rotation after the last iteration, without its scale, (N, 3, 3)."""
         scaled = super().rotations()
         return scaled / self._cell_scales[self._layout.place][:, None, None]
 
     def cell_matrices(self) -> Floats:
-        """How the last pose turned and stretched each vertex's cell, V R, (N, 3, 3)."""
+        """Return the matrices V R that turn and stretch the cells in the last pose, (N, 3, 3)."""
         if self._cartoon == 0.0:
             return self.rotations()
         return self._VR[self._layout.place].reshape(-1, 3, 3)
 
     @property
     def scales(self) -> Floats:
-        """By how much each vertex's cell is squashed or stretched on its primary axis, (N,)."""
+        """The scale of each vertex's cell along its primary axis, (N,)."""
         return self._scales[self._layout.place]
 
     def _local_step(self, x: Floats) -> None:
-        if self._priors.is_on:  # they compare rotations, and know of no scales
+        if self._priors.is_on:  # the priors compare rotations without scales
             self._unscale()
         super()._local_step(x)
         if self._priors.is_on and self._cartoon > 0.0:
@@ -213,7 +214,7 @@ class SquashStretchSolver(ArapSolver):
         self._cell_scales[:] = 1.0
 
     def _pose_step(self) -> Floats:
-        """The pose state: from the shape state's x, which it leaves, the surface to show."""
+        """The surface to show, from the shape state, which does not change."""
         if self._cartoon == 0.0:
             return self._x
         gain = self._volume_gain * self._cartoon
@@ -234,7 +235,7 @@ class SquashStretchSolver(ArapSolver):
         return self._pose
 
     def _keep_volume(self, gain: float) -> None:
-        """Swell the pose where it is squashed, and draw it in where it is stretched."""
+        """Expand the pose where it is squashed, and contract it where it is stretched."""
         self._swell[:] = 0.0
         if gain > 1.0:
             self._measure(self._x)

@@ -1,14 +1,14 @@
-"""The cells of an as-rigid-as-possible energy, laid out for the local and the global step.
+"""The cells of an ARAP energy in memory, for the local and the global step.
 
-A cell is a vertex and the edges that its one rotation R should fit: the spokes around it (Sorkine
-and Alexa 2007, eq. (3)), or the spokes and the rims of its faces (Chao et al. 2010, section 4).
-Both are one formula. With rest edges e and deformed edges e' of weight w, cell c fits its
-rotation to
+A cell is a vertex with the edges that one rotation R should fit: the spokes around the vertex
+(Sorkine and Alexa 2007, eq. (3)), or the spokes and the rims of its faces (Chao et al. 2010,
+section 4). Both follow one formula. With rest edges e and deformed edges e' of weight w, cell c
+fits its rotation to
 
     S_c = sum over its edges of w e' e^T = sum over its vertices j of (x_j - x_c) u_cj^T
 
-and pulls vertex j by R_c u_cj in the linear system of the global step. The vectors u are constants
-of the rest pose, so both energies run through the same kernels at the same cost.
+and pulls vertex j by R_c u_cj in the linear system of the global step. The vectors u depend only on
+the rest pose, so both energies use the same kernels at the same cost.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ from solvers.linear.laplacian import (
 SPOKES = "spokes"
 SPOKES_AND_RIMS = "spokes-and-rims"
 
-# Added to each face's share of an edge. The shares may be negative: a face's energy is not, being
-# that of a finite element. This much makes it positive for any face.
+# Added to each face's share of an edge weight. A share may be negative, but not a face's energy,
+# which is that of a finite element. This number makes the energy positive for any face.
 _LEAST_HALF = 1e-8
 
 
@@ -54,7 +54,7 @@ class Cells(NamedTuple):
     `fits` (M, 4) holds u_cj and the edge's weight in the Laplacian; `pulls` (M, 3) holds u_jc;
     `own` (N, 3) is u_cc, minus the sum of the row's u_cj. All u are divided by the number of cells
     that share an edge, so that the global step's matrix is the Laplacian itself. A named tuple,
-    because compiled kernels take one as it is.
+    because compiled kernels accept named tuples.
     """
 
     starts: NDArray[np.uint32]
@@ -66,9 +66,9 @@ class Cells(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class CellMesh:
-    """All that a deformation needs to know of a mesh at rest.
+    """The constants of a mesh at rest that a deformation needs.
 
-    `laplacian` is (N, N); `sharing` is the number of cells that an edge lies in.
+    `laplacian` is (N, N); `sharing` is the number of cells that contain an edge.
     """
 
     cells: Cells
@@ -78,7 +78,7 @@ class CellMesh:
 
 
 def build_cells(vertices: Floats, faces: Ints, energy: str) -> CellMesh:
-    """Lay out the cells of a mesh at rest, vertices (N, 3) and faces (F, 3)."""
+    """Build the cells of a mesh at rest, with vertices (N, 3) and faces (F, 3)."""
     if energy == SPOKES:
         edges = cotangent_edges(vertices, faces)
         return _lay_out(vertices, edges, _spokes(edges), sharing=2)
@@ -94,7 +94,7 @@ def _spokes(edges: WeightedEdges) -> Terms:
 
 
 def _spokes_and_rims(faces: Ints, halves: Floats) -> Terms:
-    """Every face's three edges, in the cells of its three corners."""
+    """Three edges of every face, each in the cells of the face's three corners."""
     proper = (faces != np.roll(faces, 1, axis=1)).all(axis=1)
     faces, halves = faces[proper], halves[proper]
     tails, heads = np.roll(faces, -1, axis=1), np.roll(faces, -2, axis=1)

@@ -1,8 +1,8 @@
-"""The local step, the global step's right-hand side, and the energy, as compiled kernels.
+"""Compiled kernels of ARAP: the local step, the global step's right-hand side, and the energy.
 
-Positions x (N, 3), rotations (N, 9) row-major; the cells' arrays are those of
-`solvers.deform.arap_cells`. Every kernel gives the same bits for any number of threads: blocks of
-vertices are independent, and sums are taken in one order.
+Positions x are (N, 3), rotations (N, 9) row-major; the cells' arrays are those of
+`solvers.deform.arap_cells`. Every kernel returns the same bits for any number of threads: blocks of
+vertices are independent, and every sum has one order.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _ENTRIES = np.uint64(9)  # of a rotation
 def covariances(  # noqa: PLR0917
     x: Floats, cells: Cells, first: int, size: int, lanes: Floats, laplace_x: Floats
 ) -> None:
-    """The covariances S of `size` cells into rows 0 to 8 of `lanes`; L x into laplace_x.
+    """Write the covariances S of `size` cells to rows 0 to 8 of `lanes`, and L x to laplace_x.
 
     Source: Sorkine and Alexa 2007, eq. (5).
     """
@@ -55,9 +55,9 @@ def covariances(  # noqa: PLR0917
 
 @parallel_kernel
 def fit_cells(x: Floats, cells: Cells, R: Floats, laplace_x: Floats, room: Floats) -> None:
-    """The local step: each cell's best rotation into R; L x into laplace_x on the way.
+    """The local step: write each cell's best rotation to R (N, 9), and L x to laplace_x (N, 3).
 
-    `room` (threads, SCRATCH) is what each thread works in.
+    `room` (threads, SCRATCH) is each thread's scratch space.
 
     Source: Sorkine and Alexa 2007, eq. (6).
     """
@@ -78,7 +78,7 @@ def fit_cells(x: Floats, cells: Cells, R: Floats, laplace_x: Floats, room: Float
 def residual(
     R: Floats, laplace_x: Floats, cells: Cells, fixed: NDArray[np.bool_], out: Floats
 ) -> None:
-    """What is left of the global step's equations, out (N, 3) = b(R) - L x; 0 where x is fixed.
+    """The residual of the global step, out (N, 3) = b(R) - L x; 0 where x is fixed.
 
     Source: Sorkine and Alexa 2007, eq. (8), for the correction of x in place of x itself.
     """
@@ -90,7 +90,7 @@ def residual(
             if fixed[i]:
                 out[i, 0] = out[i, 1] = out[i, 2] = 0.0
                 continue
-            # Eight products of R's entries and a vector's at a time, and the ninth.
+            # Eight products of entries of R and of a vector at once, then the ninth.
             turned = load(R, i * _ENTRIES, 8) * repeat_three(load_row(own, i))
             last = R[i, 8] * own[i, 2]
             for h in range(np.uint64(starts[i]), np.uint64(starts[i + np.uint64(1)])):
@@ -104,7 +104,7 @@ def residual(
 
 @kernel
 def pull_soft(places: Ints, stiffness: Floats, goals: Floats, x: Floats, out: Floats) -> None:
-    """Add to out (N, 3) what springs to goals (H, 3) pull at x; `stiffness` is by vertex (N,).
+    """Add the pull of springs from x to goals (H, 3) to out (N, 3); `stiffness` is by vertex (N,).
 
     Source: Celikcan et al. 2015, eq. (3).
     """
@@ -118,7 +118,7 @@ def pull_soft(places: Ints, stiffness: Floats, goals: Floats, x: Floats, out: Fl
 
 @parallel_kernel
 def energy_terms(x: Floats, R: Floats, rest: Floats, terms: Terms, out: Floats) -> None:
-    """Each term w |e' - R e|^2 of the energy, without cancellation, out (T,).
+    """Write each term w |e' - R e|^2 of the energy to out (T,), without cancellation.
 
     Source: Sorkine and Alexa 2007, eq. (7); Chao et al. 2010, section 4.
     """
@@ -133,7 +133,7 @@ def energy_terms(x: Floats, R: Floats, rest: Floats, terms: Terms, out: Floats) 
 
 @kernel
 def place_outside(x: Floats, order: Ints, centre: Floats, size: float, out: Floats) -> None:
-    """Vertex order[i] of out (N, 3) is x[i] times the size, plus the centre (3,)."""
+    """Set vertex order[i] of out (N, 3) to x[i] times the size, plus the centre (3,)."""
     for i in range(len(order)):
         v = order[i]
         out[v, 0] = x[i, 0] * size + centre[0]

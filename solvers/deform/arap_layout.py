@@ -1,7 +1,7 @@
-"""What a deformation solver is given, checked at the door and put into the order that it works in.
+"""Input checks of a deformation solver, and the order in which it stores the vertices.
 
-The order is the factor's, so that neighbours lie near each other in memory. It does not depend on
-the handles, which may come and go.
+The order is that of the factor, so neighbours lie near each other in memory. It does not depend on
+the handles, which may change.
 """
 
 from __future__ import annotations
@@ -22,30 +22,30 @@ _FARTHEST = 1e9  # the farthest target, in sizes of the mesh; keeps every square
 
 @dataclass(frozen=True, slots=True)
 class UnitBox:
-    """A centre (3,) and a size: inside coordinates are about one, whatever the mesh's unit is."""
+    """A centre (3,) and a size that bring a mesh of any unit to coordinates of about one."""
 
     centre: Floats
     size: float
 
     @classmethod
     def around(cls, points: Floats) -> UnitBox:
-        """The frame of a point set's bounding box; a set that is one point has size one."""
+        """The bounding box of a point set (N, 3); a set of one point has size one."""
         low, high = points.min(axis=0), points.max(axis=0)
         size = float(np.linalg.norm(high - low))
         return cls(low + 0.5 * (high - low), size if size > 0.0 else 1.0)
 
     def inside(self, points: Floats) -> Floats:
-        """Points (N, 3) in this frame."""
+        """Return points (N, 3) in the box's coordinates."""
         return (points - self.centre) / self.size
 
 
 @dataclass(frozen=True, slots=True)
 class Layout:
-    """The working order of N vertices.
+    """The order in which a solver stores N vertices.
 
-    Vertex order[i] is worked on i-th, and place[v] says when vertex v is. `faces` (F, 3) and
-    `parts` (N,), the connected component of each vertex, are in that order; `tree` is the
-    dissection whose order it is.
+    Vertex order[i] is stored at i; place[v] is the place of vertex v. `faces` (F, 3) and `parts`
+    (N,), the connected component of each vertex, use the places; `tree` is the dissection that
+    defines the order.
     """
 
     order: Ints
@@ -56,7 +56,7 @@ class Layout:
 
 
 def checked_mesh(vertices: ArrayLike, faces: ArrayLike) -> tuple[Floats, Ints]:
-    """Vertices (N, 3) and faces (F, 3), or a ValueError that says what is wrong with them."""
+    """Return vertices (N, 3) and faces (F, 3), or raise a ValueError that states the fault."""
     points = np.asarray(vertices, dtype=np.float64)
     if points.ndim != 2 or points.shape[1] != 3 or not len(points):
         raise ValueError(f"expected vertices of shape (N, 3), N > 0, got {points.shape}")
@@ -74,7 +74,7 @@ def checked_mesh(vertices: ArrayLike, faces: ArrayLike) -> tuple[Floats, Ints]:
 
 
 def checked_regions(region_of: ArrayLike, rigidity: ArrayLike, count: int) -> tuple[Ints, Floats]:
-    """Regions (N,) and rigidities (N,) in [0, 1], or a ValueError that says what is wrong."""
+    """Return regions (N,) and rigidities (N,), or raise a ValueError that states the fault."""
     regions = checked_integers(region_of, "regions")
     shares = np.asarray(rigidity, dtype=np.float64)
     for name, values in (("regions", regions), ("rigidity", shares)):
@@ -86,7 +86,7 @@ def checked_regions(region_of: ArrayLike, rigidity: ArrayLike, count: int) -> tu
 
 
 def checked_targets(targets: ArrayLike, count: int, box: UnitBox) -> Floats:
-    """Targets (H, 3), or a ValueError that says what is wrong with them."""
+    """Return targets (H, 3), or raise a ValueError that states the fault."""
     points = np.asarray(targets, dtype=np.float64)
     if points.shape != (count, 3):
         raise ValueError(f"expected targets of shape ({count}, 3), got {points.shape}")
@@ -99,16 +99,16 @@ def checked_targets(targets: ArrayLike, count: int, box: UnitBox) -> Floats:
 
 @kernel
 def _first_beyond(points: Floats, centre: Floats, most: float) -> int:
-    """The first of the points that is not within `most` of the centre on every axis, or -1."""
+    """The index of the first point farther than `most` from the centre on some axis, or -1."""
     for h in range(len(points)):
         for axis in range(3):
-            if not abs(points[h, axis] - centre[axis]) <= most:  # as NaN is not
+            if not abs(points[h, axis] - centre[axis]) <= most:  # true for NaN
                 return h
     return -1
 
 
 def lay_out(points: Floats, faces: Ints) -> Layout:
-    """The order in which the vertices at `points` (N, 3) are worked on."""
+    """Choose the order in which the vertices at `points` (N, 3) are stored."""
     count = len(points)
     tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     graph = sp.coo_matrix((np.ones(len(tails)), (tails, heads)), shape=(count, count)).tocsr()
@@ -122,7 +122,7 @@ def lay_out(points: Floats, faces: Ints) -> Layout:
 
 
 def checked_integers(values: ArrayLike, name: str) -> Ints:
-    """An array of integers, or a ValueError that names it."""
+    """Return an array of integers, or raise a ValueError that names it."""
     array = np.asarray(values)
     if array.size and not np.issubdtype(array.dtype, np.integer):
         raise ValueError(f"expected integer {name}, got {array.dtype}")

@@ -1,4 +1,4 @@
-"""The parts of a surface that no handle touches: the nearest group of handles carries them."""
+"""Parts of a surface without a handle, which the nearest group of handles carries rigidly."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ class CarriedParts:
 
     @classmethod
     def of(cls, rest: Floats, handles: Handles, layout: Layout) -> CarriedParts:
-        """Find them on a surface with rest positions (N, 3)."""
+        """Find the parts of a surface with rest positions (N, 3) that no handle touches."""
         places = unheld(handles, layout)
         return cls(places, follow_one_group(nearest_groups(rest, places, handles, layout.parts)))
 
@@ -44,7 +44,7 @@ class CarriedParts:
         return Hold(fixed, stiffness)
 
     def move(self, rest: Floats, handles: Handles, goals: Floats, x: Floats) -> None:
-        """Put them into x (N, 3), moved rigidly from rest as the handles are to `goals` (H, 3)."""
+        """Move the parts in x (N, 3) rigidly from rest, as the handles move to `goals` (H, 3)."""
         if len(self.places):
             whole = fit_motions(rest[handles.places], goals, handles.group_of, handles.count)
             moved = np.empty((len(self.places), 3))

@@ -1,4 +1,4 @@
-"""The plane of each cell at rest, in which squash and stretch looks for the cell's primary axis."""
+"""The plane of each cell at rest, in which squash and stretch finds the cell's primary axis."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import numpy as np
 
 from solvers.linear.laplacian import Floats, Ints, weighted_sums
 
-# The least extent of a cell along its second axis, as a share of the first: a ring that is nearly a
-# line has no stretch across it to speak of.
+# The least extent of a cell along its second axis, as a share of the first. A cell whose edges are
+# nearly on one line has no usable stretch across it.
 _THIN = 1e-3
 
 
 class Planes(NamedTuple):
-    """What the rest pose says of each cell; a named tuple, because kernels take one as it is.
+    """Constants of each cell at rest; a named tuple, because compiled kernels accept those.
 
     `extents` (N, 2) is trace C of the rest covariance C, and its inverse or 0. `axes` (N, 6) are
     two orthonormal rest directions that span the cell's edges best, and `shares` (N, 4), for each
@@ -38,7 +38,7 @@ def vertex_normals(vertices: Floats, faces: Ints) -> Floats:
 
 
 def _least_axis(C: Floats, strength: Floats, normals: Floats) -> Floats:
-    """The normal of each plane (N, 3): that given, or C's least axis where it is none."""
+    """The normal of each plane (N, 3): the given one, or C's least axis where that is zero."""
     pulled = C - strength[:, None, None] * normals[:, :, None] * normals[:, None, :]
     _, vectors = np.linalg.eigh(pulled)
     least: Floats = vectors[:, :, 0]
@@ -62,10 +62,10 @@ def _axes_across(normals: Floats, C: Floats) -> tuple[Floats, Floats]:
 
 
 def cell_planes(C: Floats, normals: Floats) -> Planes:
-    """What the two states need to know of the cells, from their covariances at rest (N, 3, 3).
+    """The planes of the cells, from their covariances at rest (N, 3, 3) and normals (N, 3).
 
-    A cell's plane is that of its normal, which on the edge of a box is well defined while the
-    second axis of its covariance is not; where faces have no common side, that of its covariance.
+    The normal defines a cell's plane: on the edge of a box it is well defined, while the second
+    axis of the covariance is not. Where the faces have no common side, the covariance defines it.
     """
     extents = np.trace(C, axis1=1, axis2=2)
     normals = _least_axis(C, 10.0 * extents, normals)

@@ -1,4 +1,4 @@
-"""The closed surfaces that a deforming mesh bounds, laid out so that their volumes can be kept."""
+"""Builds the closed surfaces of a mesh whose volumes squash and stretch keeps."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ import numpy as np
 from solvers.deform.volume_kernels import ClosedShells
 from solvers.linear.laplacian import Floats, Ints
 
-_CHUNK = 512  # faces that are summed in one go
+_CHUNK = 512  # faces in one partial sum
 
 
 def build_shells(vertices: Floats, faces: Ints, part_of: Ints) -> ClosedShells:
-    """The shell of a mesh (N, 3), (F, 3), whose vertices belong to components (N,)."""
+    """Return the closed surfaces of a mesh (N, 3), (F, 3) with components (N,) of its vertices."""
     count = len(vertices)
     proper = faces[(faces != np.roll(faces, 1, axis=1)).all(axis=1)]
     fans = _fans(proper, part_of)
@@ -54,7 +54,7 @@ def _fans(faces: Ints, part_of: Ints) -> Ints:
 
 
 def _chunks(part_of_face: Ints) -> tuple[Ints, Ints]:
-    """Where chunks of at most `_CHUNK` faces of one component begin, and whose they are."""
+    """The first faces of chunks of at most `_CHUNK` faces of one component, and the components."""
     count = len(part_of_face)
     if not count:
         return np.zeros(1, dtype=np.int64), np.zeros(0, dtype=np.int64)
@@ -65,7 +65,7 @@ def _chunks(part_of_face: Ints) -> tuple[Ints, Ints]:
 
 
 def _around(faces: Ints, count: int) -> tuple[Ints, Ints]:
-    """For each vertex where its corners start (N + 1,), and their other two vertices (3 F, 2)."""
+    """The first corner of each vertex (N + 1,), and each corner's other two vertices (3 F, 2)."""
     own = faces.T.ravel()
     others = np.concatenate([np.roll(faces, -1 - c, axis=1)[:, :2] for c in range(3)])
     order = np.argsort(own, kind="stable")

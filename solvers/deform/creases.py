@@ -1,15 +1,15 @@
-"""Folded triangles laid flat: what is shown of a sharp bend need not show its creases.
+"""Flattens triangles that fold over their neighbours in sharp bends of the shown surface.
 
-Where a surface bends more sharply than its triangles are small, a few of them fold over their
-neighbours, and a true minimum of the energy may do so as well. What goes on from frame to frame is
-left alone; in the surface that is shown, the corners of a folded triangle are moved to the middle
-of their neighbours, and those of its neighbourhood where that does not do.
+In a sharp bend a few triangles may fold over their neighbours; even a minimum of the energy may
+contain folds. The solver's state from frame to frame keeps them. In the shown surface, the corners
+of a folded triangle move to the middle of their neighbours. If the triangle is still folded, the
+vertices around it move as well.
 
-A fold comes and goes slowly beside a frame: each frame looks at one part of the triangles in four
-and at those that were folded when last looked at.
+Folds appear and vanish over many frames. So each frame tests one of four parts of the triangles,
+and those known to be folded.
 
-A triangle is folded when its normal points against its normal at rest, turned as its corners' cells
-are; see `runtime.output.report.watchdog`.
+A triangle is folded when its normal points against its normal at rest, turned by the cells of its
+corners; see `runtime.output.report.watchdog`.
 """
 
 from __future__ import annotations
@@ -25,10 +25,10 @@ from solvers.deform.arap_cells import Cells
 from solvers.kernels.compiled import kernel, parallel_kernel
 from solvers.linear.laplacian import Floats, Ints
 
-ROUNDS = 4  # of moving to the middle, before it is seen whether that does
+ROUNDS = 4  # of moving vertices to the middle of their neighbours between two tests
 PARTS = 4
-PASSES = 3  # what is laid flat may fold what is beside it
-REACHES = 3  # how many times what is moved grows by a ring
+PASSES = 3  # flattening a triangle may fold its neighbours
+REACHES = 3  # the moved region grows by a ring of vertices up to so many times
 
 Bools = NDArray[np.bool_]
 Indices = NDArray[np.int32]
@@ -36,7 +36,7 @@ Singles = NDArray[np.float32]
 
 
 class Sheet(NamedTuple):
-    """Triangles (F, 3), their normals at rest (F, 3), and those at each of N vertices, in rows."""
+    """Triangles (F, 3), their normals at rest (F, 3), and the triangles at each of N vertices."""
 
     faces: Indices
     normals: Singles
@@ -45,7 +45,7 @@ class Sheet(NamedTuple):
 
 
 class Moving(NamedTuple):
-    """Which vertices are moved: (N,) whether each is, and (N,) their list, as far as it goes."""
+    """The moved vertices: (N,) whether each is moved, and (N,) a list with room for all."""
 
     is_member: Bools
     members: Ints
@@ -53,23 +53,23 @@ class Moving(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class CreasesState:
-    """Which triangles (F,) are known to be folded, and which part of them was looked at last."""
+    """Which triangles (F,) are known to be folded, and which part of them was tested last."""
 
     folded: Bools
     part: int
 
 
 class Creases:
-    """Lays flat the folded triangles of one surface.
+    """Flattens the folded triangles of one surface.
 
     Args:
         rest: (N, 3) at rest, in the solver's order.
         faces: (F, 3) in that order.
-        cells: whose neighbours they are.
+        cells: the cells of the surface, for each vertex's neighbours.
     """
 
     def __init__(self, rest: Floats, faces: Ints, cells: Cells) -> None:
-        faces = faces[np.argsort(faces.min(axis=1), kind="stable")]  # as its corners are read
+        faces = faces[np.argsort(faces.min(axis=1), kind="stable")]  # in the order of their corners
         a, b, c = (rest[faces[:, corner]] for corner in range(3))
         corners = np.argsort(faces, axis=None, kind="stable")
         self._sheet = Sheet(
@@ -92,10 +92,12 @@ class Creases:
         self._folded[:], self._part = state.folded, state.part
 
     def flatten_folds(self, x: Floats, R: Floats) -> int:
-        """Lay flat in x (N, 3) what is folded under cell turns R (N, 9), handles or not.
+        """Flatten the folded triangles of x (N, 3), given the cells' rotations R (N, 9).
+
+        Handles may move, too.
 
         Returns:
-            How many triangles are known to be folded.
+            The number of triangles known to be folded.
         """
         self._part = (self._part + 1) % PARTS
         _find_folded(x, self._sheet.faces, self._sheet.normals, R, self._part, self._folded)
@@ -107,7 +109,7 @@ class Creases:
 
 @kernel
 def _is_folded(x: Floats, face: Indices, normal: Singles, R: Floats) -> bool:
-    """Whether a triangle points against where its corners' cells have turned its normal."""
+    """Whether a triangle's normal points against its rest normal, turned by its corners' cells."""
     a, b, c = face[0], face[1], face[2]
     u0, u1, u2 = x[b, 0] - x[a, 0], x[b, 1] - x[a, 1], x[b, 2] - x[a, 2]
     v0, v1, v2 = x[c, 0] - x[a, 0], x[c, 1] - x[a, 1], x[c, 2] - x[a, 2]
@@ -125,7 +127,7 @@ def _is_folded(x: Floats, face: Indices, normal: Singles, R: Floats) -> bool:
 def _find_folded(  # noqa: PLR0917
     x: Floats, faces: Indices, normals: Singles, R: Floats, part: int, folded: Bools
 ) -> None:
-    """Bring `folded` (F,) up to date: for one part of the triangles, and for those that were."""
+    """Update `folded` (F,) for one part of the triangles and for those known to be folded."""
     for f in prange(len(faces)):
         if folded[f] or f % PARTS == part:
             folded[f] = _is_folded(x, faces[f], normals[f], R)
@@ -135,7 +137,7 @@ def _find_folded(  # noqa: PLR0917
 def _lay_flat(  # noqa: PLR0917
     x: Floats, which: Ints, sheet: Sheet, R: Floats, cells: Cells, moving: Moving
 ) -> None:
-    """Lay flat the triangles named by `which`, then those beside them that have folded by it."""
+    """Flatten the triangles `which`, then their neighbours that folded because of that."""
     for _ in range(PASSES):
         count = _flatten(x, which, sheet, R, cells, moving)
         size = 0
@@ -161,10 +163,10 @@ def _lay_flat(  # noqa: PLR0917
 def _flatten(  # noqa: PLR0917
     x: Floats, which: Ints, sheet: Sheet, R: Floats, cells: Cells, moving: Moving
 ) -> int:
-    """Move the corners of folded faces, and rings around them, until none of these is folded.
+    """Move the corners of folded faces, and rings around them, until none of the faces is folded.
 
     Returns:
-        How many vertices were moved: the first so many of `moving.members`.
+        The number of moved vertices, which are the first of `moving.members`.
     """
     count = 0
     for f in which:
@@ -189,7 +191,7 @@ def _flatten(  # noqa: PLR0917
 
 @kernel
 def _take(i: np.int64, moving: Moving, count: int) -> int:
-    """Let vertex i be moved as well."""
+    """Add vertex i to the moved vertices; return their new number."""
     if moving.is_member[i]:
         return count
     moving.is_member[i] = True

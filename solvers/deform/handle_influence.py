@@ -1,9 +1,9 @@
-"""How a surface goes along with its handles before it bends, while handles come and go.
+"""Which groups of handles each vertex follows before the solver bends the surface.
 
-Each vertex follows a smooth blend of the motions of the groups of handles that matter most to it.
-The shares of the blend are harmonic functions of the held surface. When other handles are held, the
-shares that are known go on being used, and new ones are found a few at a time, tick by tick, so
-that no frame waits for them; nothing depends on how fast the machine is.
+Each vertex follows a smooth blend of the motions of the groups with the largest influence on it.
+The influences are harmonic functions of the held surface. After a change of handles the solver uses
+the known influences until new ones are complete. Each frame finds three groups, so no frame waits;
+the number does not depend on the speed of the machine.
 """
 
 from __future__ import annotations
@@ -19,20 +19,20 @@ from solvers.kernels.compiled import kernel
 from solvers.linear.constrained_system import ConstrainedSystem
 from solvers.linear.laplacian import Floats, Ints
 
-ROUNDS = 1  # of three groups each, in a tick
+ROUNDS = 1  # of three groups each, in a frame
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HandleInfluenceState:
-    """The influences at one moment, and how far the search for new ones has come.
+    """The influences at one moment, and the progress of the search for new ones.
 
     Attributes:
         influences, known: as of `HandleInfluence`.
         count: the groups that `influences` names.
-        group_at: (N,) the group at each vertex in the numbers of `influences`, -1 for none.
+        group_at: (N,) the group at each vertex in the numbering of `influences`, -1 for none.
         handles: the handles whose influences are being found.
         latest: those handles with their newest weights.
-        changed: whether the weights changed while the search went on.
+        changed: whether the weights changed during the search.
         next_group: the first group that is still to be found.
         new_group_at: (N,) the group of `handles` at each vertex, -1 for none.
         groups: (N, KEPT) the groups that were found so far.
@@ -58,15 +58,16 @@ class HandleInfluenceState:
 
 
 class HandleInfluence:
-    """Finds which groups of handles a surface's vertices follow.
+    """Finds the groups of handles that a surface's vertices follow.
 
     Args:
-        system: the surface as the handles hold it; it is asked again when they change.
-        handles: who is followed.
+        system: the surface's Laplacian, held by the handles.
+        handles: the handles and their groups.
 
     Attributes:
-        influences: the groups that each vertex follows, in the numbers of when they were found.
-        known: (H,) the group of each handle in those numbers, -1 for one that came since.
+        influences: the groups that each vertex follows, in the numbering of the handles for which
+            they were found.
+        known: (H,) the group of each handle in that numbering, -1 for a handle that is newer.
     """
 
     influences: Influences
@@ -82,21 +83,21 @@ class HandleInfluence:
         self._complete()
 
     def hold(self, handles: Handles) -> None:
-        """Follow these from now on: other vertices, or other groups."""
+        """Find the influences of other handles or groups from now on."""
         self._begin(handles)
         self.known = self._group_at[handles.places]
         if not (self.known >= 0).any():
             self._complete()
 
     def reweigh(self, handles: Handles) -> None:
-        """Know that the same handles hold otherwise; what is being found is found to the end."""
+        """Take new weights of the same handles; a search in progress is completed first."""
         self._changed = True
         if self._next >= self._handles.count:
             self._begin(handles)
         self._latest = handles
 
     def snapshot(self) -> HandleInfluenceState:
-        """Return the influences and the state of the search; only what may change is copied."""
+        """Return the influences and the state of the search; arrays in progress are copied."""
         state = HandleInfluenceState(
             self.influences,
             self.known,
@@ -123,7 +124,7 @@ class HandleInfluence:
         self._groups, self._weights = state.groups, state.weights
 
     def advance(self) -> None:
-        """Find a few of the shares that are not known yet."""
+        """Find the influences of the next groups, if any are missing."""
         for _ in range(ROUNDS):
             if self._next >= self._handles.count:
                 return
@@ -169,7 +170,7 @@ def _with_copies(state: HandleInfluenceState) -> HandleInfluenceState:
 def _keep_largest(
     shares: Floats, first: int, most: int, groups: NDArray[np.uint32], weights: Floats
 ) -> None:
-    """Insert three more groups' shares into each row's list, largest first."""
+    """Insert the shares of three more groups into each vertex's list, largest first."""
     for i in range(len(groups)):
         for k in range(most):
             w = shares[i, k]
@@ -183,7 +184,7 @@ def _keep_largest(
 
 @kernel
 def _normalise(weights: Floats) -> None:
-    """Let each row sum to one; one that no share reaches follows its first group."""
+    """Scale each row to a sum of one; a row without any share follows its first group."""
     for i in range(len(weights)):
         total = 0.0
         for k in range(KEPT):

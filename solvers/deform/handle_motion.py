@@ -1,10 +1,10 @@
-"""Where a surface is likely to go next: it moves along with the handles.
+"""Moves a surface along with its handles, as a start for the solver's iterations.
 
-The handles around one skeleton node form a group and move rigidly. Each group's motion between two
-sets of handle positions is fitted (Kabsch 1976), and every vertex follows a smooth blend of the
-motions of the groups that matter most to it, as dual quaternions (Kavan et al. 2007, Skinning with
-dual quaternions, section 3), so that equal motions blend to that motion exactly and half turns do
-not collapse. Deformation that starts there has only the bending left to find.
+The handles around one skeleton node form a group and move rigidly. The motion of each group between
+two sets of handle positions is fitted (Kabsch 1976). Every vertex follows a smooth blend of the
+motions of its groups as dual quaternions (Kavan et al. 2007, Skinning with dual quaternions,
+section 3): equal motions blend to exactly that motion, and half turns do not collapse. From this
+start the solver has only the bending left to find.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from solvers.linear.laplacian import Floats, Ints
 
 KEPT = 4  # groups that move a vertex
 _COLLINEAR = 1e-6  # second over first extent of points that count as a line
-_PRIOR = 1e-6  # how much the rotation of all handles counts where a group has no say
+_PRIOR = 1e-6  # weight of the rotation of all handles where a group's own is ambiguous
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,12 +35,12 @@ class Influences:
 
 
 def fit_motions(source: Floats, target: Floats, group_of: Ints, count: int) -> Floats:
-    """The rigid motions of `count` groups as dual quaternions (G, 8), scalars first.
+    """Fit the rigid motions of `count` groups as dual quaternions (G, 8), scalars first.
 
-    Each takes its points of `source` (H, 3) nearest to those of `target` (H, 3); `group_of` (H,)
-    says whose a point is, -1 for nobody's. What a group leaves open (a point has no rotation, a
-    line none about itself, an empty group nothing at all) is settled by the motion of all points
-    together, and what that leaves open by turning as little as possible.
+    Each motion takes the group's points of `source` (H, 3) as near as possible to those of `target`
+    (H, 3); `group_of` (H,) is the group of each point, -1 for none. A group may leave its motion
+    ambiguous: a point has no rotation, a line has none about itself, an empty group has no motion.
+    The motion of all points together then decides, and after that the smallest rotation.
 
     Source: Kabsch 1976; Horn 1987.
     """
@@ -93,7 +93,7 @@ def _covariances(
 
 @kernel
 def _rotations(S: Floats, prior: Floats) -> Floats:
-    """Rotations (G, 9) nearest to covariances S (G, 9), settled by a prior (9,) where ambiguous."""
+    """Rotations (G, 9) nearest to covariances S (G, 9), with a prior (9,) where ambiguous."""
     count = len(S)
     R = np.empty((count, 9))
     lanes = np.empty(SCRATCH)
@@ -112,7 +112,7 @@ def _rotations(S: Floats, prior: Floats) -> Floats:
 
 @kernel
 def _prior_strength(S: Floats) -> float:
-    """How much of the prior settles a covariance (9,): nothing, unless its points lie on a line."""
+    """The weight of the prior for a covariance (9,): zero unless its points lie on a line."""
     a, b, c, d, e, f, g, h, i = S[0], S[1], S[2], S[3], S[4], S[5], S[6], S[7], S[8]
     norm2 = a * a + b * b + c * c + d * d + e * e + f * f + g * g + h * h + i * i
     cofactors2 = (
@@ -174,7 +174,7 @@ def move_along(
         for k in range(1, KEPT):
             g = groups[i, k]
             q0, q1, q2, q3 = motions[g, 0], motions[g, 1], motions[g, 2], motions[g, 3]
-            # Of a rotation's two quaternions, the one on the first one's side.
+            # Of the two quaternions of a rotation, take the one nearer to the first group's.
             m = math.copysign(weights[i, k], q0 * p0 + q1 * p1 + q2 * p2 + q3 * p3)
             w, a, b, c = w + m * q0, a + m * q1, b + m * q2, c + m * q3
             dw, da = dw + m * motions[g, 4], da + m * motions[g, 5]
@@ -186,7 +186,7 @@ def move_along(
 
 @kernel
 def _path(q: Quaternion, d: Quaternion, x: Vector) -> Vector:
-    """How far a point goes under a dual quaternion q + e d, scalars first, of any length."""
+    """The displacement of a point by a dual quaternion q + e d, scalars first, of any length."""
     w, a, b, c = q
     dw, da, db, dc = d
     s = 2.0 / (w * w + a * a + b * b + c * c)
@@ -205,20 +205,20 @@ def _path(q: Quaternion, d: Quaternion, x: Vector) -> Vector:
 
 
 def follow(points: Floats, influences: Influences, motions: Floats, out: Floats) -> None:
-    """Move points (N, 3) by the motions (G, 8) that they follow, into out (N, 3)."""
+    """Move points (N, 3) by the motions (G, 8) that they follow; write them to out (N, 3)."""
     move_along(points, influences.groups, influences.weights, motions, out)
 
 
 def follow_one_group(group_of: Ints) -> Influences:
-    """Influences of points that each follow one group alone, (N,)."""
+    """Return influences of points that each follow a single group, (N,)."""
     groups = np.repeat(group_of.astype(np.uint32)[:, None], KEPT, axis=1)
     return Influences(groups, np.full(groups.shape, 1.0 / KEPT))
 
 
 def farthest_motion(motions: Floats, points: Floats, group_of: Ints) -> tuple[float, float]:
-    """The largest turn [rad] and the longest path of the groups' points (H, 3) under motions.
+    """Return the largest turn [rad] and the longest path of points (H, 3) under motions (G, 8).
 
-    Points of nobody, whose `group_of` (H,) is -1, do not count.
+    Points without a group, whose `group_of` (H,) is -1, do not count.
     """
     turn, path = _farthest(motions, points, group_of)
     return turn, path

@@ -15,7 +15,7 @@ from solvers.linear.laplacian import Floats, Ints
 
 HARD = np.inf  # the weight of a handle that is met exactly
 
-# The least weight of a soft handle that is left: a surface that nothing holds would be anywhere.
+# The least weight of a soft handle: a surface without any hold has no unique solution.
 LEAST_WEIGHT = 1e-6
 
 
@@ -24,11 +24,11 @@ class Handles:
     """H handles of a surface of N vertices, in its working order.
 
     Attributes:
-        places: (H,) where each handle is in the order.
+        places: (H,) the place of each handle in the solver's order.
         group_of: (H,) the group of each, 0 to count - 1; a group moves rigidly.
-        count: how many groups there are.
+        count: the number of groups.
         weights: (H,) how firmly each is held, as shares of the mean weight of a vertex in the
-            surface's Laplacian; `HARD` where its target is met exactly.
+            surface's Laplacian; `HARD` meets the target exactly.
     """
 
     places: Ints
@@ -38,7 +38,7 @@ class Handles:
 
     @property
     def hard(self) -> NDArray[np.bool_]:
-        """(H,) bool: whose target is met exactly."""
+        """(H,) bool: the handles whose targets are met exactly."""
         return np.isinf(self.weights)
 
     def reweighted(self, weights: ArrayLike) -> Handles:
@@ -49,7 +49,7 @@ class Handles:
 def checked_handles(
     handles: ArrayLike, groups: ArrayLike | None, weights: ArrayLike | None, layout: Layout
 ) -> Handles:
-    """Handles as given by vertex index (H,), or a ValueError that says what is wrong with them."""
+    """Return handles given by vertex index (H,), or raise a ValueError that states the fault."""
     chosen = checked_integers(handles, "handles")
     if chosen.ndim != 1 or not len(chosen):
         raise ValueError(f"expected handles of shape (H,), H > 0, got {chosen.shape}")
@@ -81,7 +81,7 @@ def _checked_weights(weights: ArrayLike, handles: Handles) -> Floats:
 
 
 def unheld(handles: Handles, layout: Layout) -> Ints:
-    """The places of vertices in components without a handle, and of those without a face."""
+    """Return the places of the vertices without a face or in a component without a handle."""
     held = np.zeros(int(layout.parts.max()) + 1, dtype=bool)
     held[layout.parts[handles.places]] = True
     free = ~held[layout.parts]
@@ -90,7 +90,7 @@ def unheld(handles: Handles, layout: Layout) -> Ints:
 
 
 def nearest_groups(rest: Floats, carried: Ints, handles: Handles, parts: Ints) -> Ints:
-    """For each carried vertex (C,) the group of the handle nearest to its component at rest."""
+    """Return for each carried vertex (C,) the group nearest to its component at rest."""
     if not len(carried):
         return np.zeros(0, dtype=np.int64)
     distance, handle = KDTree(rest[handles.places]).query(rest[carried])
@@ -105,16 +105,16 @@ def nearest_groups(rest: Floats, carried: Ints, handles: Handles, parts: Ints) -
 def stretched_turns(
     turns: Floats, axes: Floats, lengths: Floats, thinning: float, whole: Floats
 ) -> Floats:
-    """Linear maps (G, 3, 3) of groups that are stretched along an axis, turned, and then `whole`.
+    """Return the maps (G, 3, 3) that stretch groups along an axis, turn them, and apply `whole`.
 
-    Across its axis a group becomes thinner by its length to the power of `thinning`.
+    Across its axis a group is scaled by its length to the power of -`thinning`.
 
     Args:
         turns: (G, 4) rotations, quaternions (x, y, z, w) of any length.
-        axes: (G, 3) unit vectors at rest, or zero for a group that is scaled all round.
-        lengths: (G,) how long each is along its axis, as a share of its length at rest, positive.
+        axes: (G, 3) unit vectors at rest; zero for a group that is scaled in all directions.
+        lengths: (G,) the length of each along its axis over its length at rest, positive.
         thinning: 0.5 keeps the volume.
-        whole: (3, 3) what is done to all of them afterwards.
+        whole: (3, 3) a map that is applied to all groups afterwards.
     """
     maps = np.empty((len(turns), 3, 3))
     _turn_and_stretch(turns, axes, lengths, thinning, whole, maps)
@@ -146,13 +146,13 @@ def _turn_and_stretch(  # noqa: PLR0917
 
 
 def group_targets(offsets: Floats, group_of: Ints, turns: Floats, positions: Floats) -> Floats:
-    """Targets (H, 3) of handles whose groups have a position and a rotation each.
+    """Return targets (H, 3) of handles from a position and a rotation of each group.
 
     Args:
         offsets: (H, 3) of each handle from its group's origin, at rest.
         group_of: (H,) the group of each, 0 to G - 1.
         turns: (G, 3, 3) rotations, or any other linear maps, of the groups.
-        positions: (G, 3) where their origins are.
+        positions: (G, 3) of the groups' origins.
     """
     targets = np.empty_like(offsets)
     _move_groups(offsets, group_of, turns, positions, targets)

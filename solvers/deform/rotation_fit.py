@@ -2,12 +2,12 @@
 
 R maximises trace(R^T S) over proper rotations (Kabsch 1976; Sorkine and Alexa 2007, eq. (6)), also
 where S is planar, a line, a point or a reflection. The fast path is the closed form of Markley 1993
-(Attitude determination using vector observations: a fast optimal matrix algorithm), on the largest
-root of its quartic; it has no branch and no trigonometry, so the compiler runs it on a whole vector
-of matrices, in several short passes: a processor that waits for a division can begin the next
-vector only if it is not far off. Where the closed form is ill-conditioned (two rotations nearly as
-good as each other) it is checked and replaced by Horn's 4x4 eigenproblem (Horn 1987) with Jacobi's
-method.
+(Attitude determination using vector observations: a fast optimal matrix algorithm), with the
+largest root of its quartic. It has no branch and no trigonometry, so the compiler works on whole
+vectors of matrices. It runs in several short passes: while a division is pending, a processor can
+begin the next vector only if its instructions follow soon. Where the closed form is ill-conditioned
+(two rotations fit nearly equally well), a check detects that, and Horn's 4x4 eigenproblem (Horn
+1987) with Jacobi's method replaces it.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ _ORTHOGONAL = 1e-16  # squared; a Newton-Schulz step takes anything nearer to 1e
 _NEARLY_ORTHOGONAL = 1e-9  # squared; two steps do
 
 
-# Matrices are worked on LANES at a time, in a flat array of rows of LANES numbers: 9 rows of the
+# LANES matrices are processed at once, in a flat array of rows of LANES numbers: 9 rows of the
 # matrices, 9 of their rotations, 1 of the error. With a single array and constant strides the
-# compiler can prove that nothing overlaps, which it needs in order to use vector instructions.
-# Until there are rotations, their rows hold what the quartic is made of, and its root.
+# compiler can prove that nothing overlaps, which vector instructions require. Before the rotations
+# are known, their rows hold the coefficients of the quartic and its root.
 LANES = 64
 _ROTATION = 9 * LANES
 _DEFECT = 18 * LANES
@@ -39,7 +39,7 @@ _NORM2, _DET, _COF2, _ROOT = 9 * LANES, 10 * LANES, 11 * LANES, 12 * LANES
 def fit_rotations(lanes: Floats, count: int) -> None:
     """Fill rows 9 to 17 of `lanes` (SCRATCH,) with the rotations nearest to rows 0 to 8.
 
-    Only the first `count` of the LANES columns are looked at; matrices are row-major.
+    Only the first `count` of the LANES columns are used; matrices are row-major.
     """
     _start_roots(lanes, count)
     _polish_roots(lanes, count)
@@ -79,7 +79,7 @@ def _start_roots(lanes: Floats, count: int) -> None:
 
 @kernel
 def _polish_roots(lanes: Floats, count: int) -> None:
-    """Three steps of Halley's, which cannot miss the largest root of a quartic with four."""
+    """Three steps of Halley's method, which converges to the largest of the four real roots."""
     for k in range(count):
         norm2, det, cof2 = lanes[_NORM2 + k], lanes[_DET + k], lanes[_COF2 + k]
         root = lanes[_ROOT + k]
@@ -123,10 +123,10 @@ def _fit_well_conditioned(lanes: Floats, count: int) -> None:
 
 @kernel
 def _straighten(lanes: Floats, first: int, last: int) -> None:
-    """A Newton-Schulz step of columns first to last, and how far from orthogonal they were.
+    """A Newton-Schulz step for columns first to last, and their distance from orthogonality.
 
-    An error of the root leaves R's singular vectors right and its singular values a little off
-    one. This puts them back.
+    An error of the root changes only R's singular values, which are then not quite one. This step
+    corrects them.
     """
     for k in range(first, last):
         a, b = lanes[_ROTATION + k], lanes[_ROTATION + LANES + k]

@@ -1,26 +1,28 @@
-"""What the rotations of cells know of each other: smoothed rotations, and limbs that stay stiff.
+"""Energy terms between the rotations of cells: smooth rotations, and limbs that stay stiff.
 
-Plain as-rigid-as-possible energy lets each cell turn by itself. Two terms may be added to it, with
+In plain ARAP the rotations of the cells are independent. Two terms may be added to its energy, with
 M the mass of a cell at rest (its edges' w |e|^2), A the surface's area, w the edges' weights:
 
 - smooth rotations, a A sum over half-edges (k, l) of w |R_k - R_l|^2: bending spreads evenly,
   however fine the mesh and however few the handles (Levi and Gotsman 2015, Smooth rotation enhanced
   as-rigid-as-possible mesh animation);
-- articulated stiffness, c s / (1 - s) sum over cells of M_k r_k |R_k - Q_region(k)|^2: every region
-  has a rotation Q of its own, which its cells keep to where their rigidity r is one, so that limbs
-  stay straight and joints bend (Celikcan et al. 2015, section 8, name it as future work).
+- stiff segments, c s / (1 - s) sum over cells of M_k r_k |R_k - Q_region(k)|^2: every region has
+  one rotation Q, and its cells stay near Q where their rigidity r is one. So limbs stay straight
+  and joints bend (Celikcan et al. 2015, section 8, name it as future work).
 
-Both are rotations again: |R - B|^2 = 6 - 2 <R, B>, so that a cell fits S_k + P_k in place of its
-covariance S_k alone, with a prior P_k, and no matrix changes. No local step can raise the energy:
+For rotations |R - B|^2 = 6 - 2 <R, B>. So each cell fits S_k + P_k, with a prior P_k, in place of
+its covariance S_k, and the matrix of the global step stays the same. No local step raises the
+energy:
 
-- |R_k - R_l|^2 <= 2 |R_k - B|^2 + 2 |R_l - B|^2 for any B, and equal where B is their mean; with
-  that mean at the last rotations every cell can be fitted by itself, all of them at once;
-- a region's Q is the one nearest to its cells' rotations, as they are;
-- after the fit every region turns as a whole, its cells and its Q alike, by what is best for it:
-  cells alone, each held back by Q, would take ever more steps to turn as all of them want to.
+- |R_k - R_l|^2 <= 2 |R_k - B|^2 + 2 |R_l - B|^2 for any B, with equality where B is their mean.
+  With the mean of the last rotations as B, all cells can be fitted independently.
+- A region's Q is the rotation nearest to its cells' current rotations.
+- After the fit each region turns as a whole, its cells and its Q together, by the rotation that
+  lowers the energy most. Without this step Q would hold back each cell, and a common turn would
+  need many steps.
 
-Rotations that depend on each other must start where the last frame's ended. They move along with
-the handles just as positions do.
+Rotations with these terms must start from those of the last frame. They move along with the handles
+as positions do.
 """
 
 from __future__ import annotations
@@ -39,7 +41,7 @@ from solvers.kernels.compiled import kernel, parallel_kernel
 from solvers.linear.laplacian import Floats, Ints
 
 SMOOTHNESS = 0.02  # Levi and Gotsman's alpha
-HALF = 0.05  # c: stiffness 1/2 about halves what a limb bends between its joints (measured)
+HALF = 0.05  # c: stiffness 1/2 about halves the bend of a limb between its joints (measured)
 
 _R = 9 * LANES
 
@@ -55,14 +57,14 @@ class Regions(NamedTuple):
 
     @classmethod
     def by_label(cls, labels: Ints) -> Regions:
-        """The partition whose regions are called 0, 1, ... in `labels` (N,)."""
+        """Return the partition with regions 0, 1, ... given by `labels` (N,)."""
         members = np.argsort(labels, kind="stable").astype(np.int64)
         starts = np.searchsorted(labels[members], np.arange(int(labels.max(initial=0)) + 2))
         return cls(np.ascontiguousarray(labels, dtype=np.int64), members, starts.astype(np.int64))
 
 
 class RotationPriors:
-    """The terms that tie the rotations R (N, 9) of a surface's cells to each other.
+    """The energy terms between the rotations R (N, 9) of a surface's cells.
 
     Args:
         mesh: the cells at rest.
@@ -95,14 +97,14 @@ class RotationPriors:
         return self.stiffness > 0.0 and self._regions is not None
 
     def stiffen(self, region_of: Ints, rigidity: Floats) -> None:
-        """Know the region (N,) of each cell and how rigid each is (N,), in [0, 1]."""
+        """Set the region (N,) and the rigidity (N,) in [0, 1] of each cell."""
         _, labels = np.unique(region_of, return_inverse=True)
         self._regions = Regions.by_label(labels)
         self._rigid_masses = self._masses * rigidity
         self._Q = np.empty((len(self._regions.starts) - 1, 9))
 
     def find(self, R: Floats) -> Floats:
-        """The priors (N, 9) of the next fit, given the rotations; no rows where nothing is on."""
+        """Return the priors (N, 9) of the next fit, given the rotations; (0, 9) without a term."""
         if not self.is_on:
             return NO_PRIORS
         if len(self._room) != len(R):
@@ -116,7 +118,7 @@ class RotationPriors:
         return self._room
 
     def turn_regions(self, S: Floats, R: Floats) -> None:
-        """After a fit with covariances S (N, 9), let every region turn as a whole."""
+        """After a fit with covariances S (N, 9), turn every region as a whole."""
         if self._is_stiff:
             regions, _ = self._stiff
             twists(S, R, self._cells, self._smooth_share, regions.of_cell, self._twists)
@@ -124,7 +126,7 @@ class RotationPriors:
             turn_each(self._Q, regions.of_cell, R)
 
     def energy(self, R: Floats) -> float:
-        """What the terms add to the energy of a surface whose cells are turned by R (N, 9)."""
+        """Return the energy of the terms for cells with rotations R (N, 9)."""
         total = 0.0
         if self.is_on and len(self._terms) != len(R):
             self._terms = np.empty(len(R))
@@ -145,7 +147,7 @@ class RotationPriors:
 
     @property
     def _smooth_share(self) -> float:
-        """What w (R_k + R_l) counts for in a prior: E is -2 sharing <R, S + P> and a constant."""
+        """The factor of w (R_k + R_l) in a prior: E is -2 sharing <R, S + P> plus a constant."""
         return 2.0 * self._smoothing / self._sharing
 
     @property
@@ -172,7 +174,7 @@ def add_priors(lanes: Floats, priors: Floats, first: int, size: int) -> None:
 
 @kernel
 def leave_covariances(lanes: Floats, priors: Floats, first: int, size: int) -> None:
-    """Take the priors out of `lanes` again; their rows hold the covariances alone from then on."""
+    """Subtract the priors from `lanes` again, and replace the priors by the covariances."""
     for k in range(size):
         for entry in range(9):
             S = lanes[entry * LANES + k] - priors[first + k, entry]
@@ -183,7 +185,7 @@ def leave_covariances(lanes: Floats, priors: Floats, first: int, size: int) -> N
 def fit_cells_near(  # noqa: PLR0917
     x: Floats, cells: Cells, priors: Floats, R: Floats, laplace_x: Floats, room: Floats
 ) -> None:
-    """`solvers.deform.arap_kernels.fit_cells` with priors (N, 9); S is put into their place."""
+    """`solvers.deform.arap_kernels.fit_cells` with priors (N, 9), which S then replaces."""
     count = len(cells.starts) - 1
     for block in prange((count + LANES - 1) // LANES):
         lanes = room[get_thread_id()]
@@ -200,9 +202,10 @@ def fit_cells_near(  # noqa: PLR0917
 
 @parallel_kernel
 def smooth_priors(R: Floats, cells: Cells, factor: float, out: Floats) -> None:
-    """What smoothness asks of each cell, out (N, 9): factor times the sum of w (R_k + R_l).
+    """The smoothness prior of each cell, out (N, 9): factor times the sum of w (R_k + R_l).
 
-    A weight below zero, which a rim's obtuse angle may cause, counts as zero: it would repel.
+    A weight below zero, which a rim's obtuse angle may cause, counts as zero: it would drive the
+    rotations apart.
     """
     starts, neighbours, fits = cells.starts, cells.neighbours, cells.fits
     for index in prange(len(R)):
@@ -264,7 +267,7 @@ def nearest_rotations(R: Floats, regions: Regions, weights: Floats, out: Floats)
 def add_region_priors(
     Q: Floats, region_of: Ints, rigid_masses: Floats, kappa: float, out: Floats
 ) -> None:
-    """Add what stiffness asks of each cell to out (N, 9): its region's Q (G, 9), weighted."""
+    """Add the stiffness prior of each cell to out (N, 9): its region's Q (G, 9), weighted."""
     for i in prange(len(out)):
         weight, region = kappa * rigid_masses[i], region_of[i]
         for entry in range(9):
@@ -273,7 +276,7 @@ def add_region_priors(
 
 @parallel_kernel
 def unevenness(R: Floats, Q: Floats, region_of: Ints, rigid_masses: Floats, out: Floats) -> None:
-    """What each cell's rotation costs that is not its region's, out (N,): its mass |R_k - Q|^2."""
+    """The stiffness energy of each cell, out (N,): its mass times |R_k - Q|^2."""
     for i in prange(len(R)):
         square, region = 0.0, region_of[i]
         for entry in range(9):
@@ -286,9 +289,9 @@ def unevenness(R: Floats, Q: Floats, region_of: Ints, rigid_masses: Floats, out:
 def twists(  # noqa: PLR0917
     S: Floats, R: Floats, cells: Cells, factor: float, region_of: Ints, out: Floats
 ) -> None:
-    """What each cell asks of its region's turn, out (N, 9): (S_k + P_k) R_k^T.
+    """Each cell's term of its region's common rotation, out (N, 9): (S_k + P_k) R_k^T.
 
-    The prior P_k counts cells of other regions only: those of its own turn along.
+    The prior P_k counts only cells of other regions: cells of the same region turn with it.
     """
     starts, neighbours, fits = cells.starts, cells.neighbours, cells.fits
     for index in prange(len(R)):

@@ -1,9 +1,9 @@
-"""The cells of squash and stretch as compiled kernels: uniform scales, axes, and local volume.
+"""Compiled kernels of squash and stretch: the scales, axes and volumes of cells.
 
-The arrays are those of `solvers.deform.arap_kernels`. A cell's edges enter only through its
-covariance S = sum of w e' e^T: with the best rotation R, trace(S R^T) is the numerator of the
-scale in eq. (8), and R^T S holds the cell's stretch as its rest edges see it. So the second state
-needs no second look at the edges.
+The arrays are those of `solvers.deform.arap_kernels`. A cell's edges occur only in its covariance
+S = sum of w e' e^T: with the best rotation R, trace(S R^T) is the numerator of the scale in
+eq. (8), and R^T S is the cell's stretch in rest coordinates. So the pose state does not read the
+edges again.
 
 Source: Celikcan, Yaz and Capin 2015, section 4.
 """
@@ -24,17 +24,17 @@ from solvers.linear.laplacian import Floats
 
 _R = 9 * LANES
 
-# A scale outside this range counts as its end: no cell collapses to a point or grows for ever.
+# Scales are clamped to this range, so that no cell collapses to a point or grows without bound.
 LEAST_SCALE, LARGEST_SCALE = 0.2, 5.0
 
 _TINY = 1e-300
 
 
 class Fit(NamedTuple):
-    """What a local step writes; a named tuple, because kernels take one as it is.
+    """The arrays that a local step writes; a named tuple, because compiled kernels accept those.
 
     `matrices` (N, 9) are the cells' s R or V R, `scales` (N,) their scales, `laplace_x` (N, 3) is
-    L x, and `room` (threads, SCRATCH) is what each thread works in.
+    L x, and `room` (threads, SCRATCH) is each thread's scratch space.
     """
 
     matrices: Floats
@@ -45,8 +45,8 @@ class Fit(NamedTuple):
 
 @parallel_kernel
 def rest_covariances(rest: Floats, cells: Cells, out: Fit) -> None:
-    """The covariance of each cell's edges at rest, into out.matrices."""
-    matrices, _, laplace_x, room = out  # numba loses what is written through the tuple
+    """Write the covariance of each cell's edges at rest to out.matrices."""
+    matrices, _, laplace_x, room = out  # numba drops writes through the tuple
     count = len(cells.starts) - 1
     for block in prange((count + LANES - 1) // LANES):
         lanes, first = room[get_thread_id()], block * LANES
@@ -58,7 +58,7 @@ def rest_covariances(rest: Floats, cells: Cells, out: Fit) -> None:
 
 @parallel_kernel
 def fit_scaled_cells(x: Floats, cells: Cells, planes: Planes, cartoon: float, out: Fit) -> None:
-    """The shape state's local step: s_i R_i of each cell, s_i drawn to one by 1 - cartoon.
+    """The shape state's local step: s_i R_i of each cell, with s_i - 1 multiplied by `cartoon`.
 
     Source: Celikcan et al. 2015, eqs. (5), (6) and (8).
     """
@@ -73,7 +73,7 @@ def fit_scaled_cells(x: Floats, cells: Cells, planes: Planes, cartoon: float, ou
 
 @parallel_kernel
 def scale_cells(x: Floats, cells: Cells, planes: Planes, cartoon: float, out: Fit) -> None:
-    """Like `fit_scaled_cells`, but the rotations are those that `out` holds already."""
+    """Like `fit_scaled_cells`, with the rotations that `out` already holds."""
     matrices, scales, laplace_x, room = out
     count = len(cells.starts) - 1
     for block in prange((count + LANES - 1) // LANES):
@@ -101,7 +101,7 @@ def fit_pose_cells(x: Floats, cells: Cells, planes: Planes, gain: float, out: Fi
 
 @parallel_kernel
 def pose_cells(x: Floats, cells: Cells, planes: Planes, gain: float, out: Fit) -> None:
-    """Like `fit_pose_cells`, but the rotations are those that `out` holds already."""
+    """Like `fit_pose_cells`, with the rotations that `out` already holds."""
     matrices, scales, laplace_x, room = out
     count = len(cells.starts) - 1
     for block in prange((count + LANES - 1) // LANES):
@@ -122,7 +122,7 @@ def _load_rotations(lanes: Floats, first: int, R: Floats) -> None:
 def _scale_block(
     lanes: Floats, first: int, planes: Planes, cartoon: float, out: tuple[Floats, Floats]
 ) -> None:
-    """The scales of LANES cells from their covariances and rotations, and both multiplied."""
+    """The scales of LANES cells from their covariances and rotations, and scale times rotation."""
     extents = planes.extents
     matrices, scales = out
     for k in range(min(LANES, len(scales) - first)):
@@ -167,9 +167,9 @@ def _pose_block(
 
 @kernel
 def _stretch(lanes: Floats, size: int, planes: Planes, first: int) -> None:
-    """The stretch of each cell in its rest plane into rows 0 to 2 of `lanes`: aa, ab, bb.
+    """Write the stretch of each cell in its rest plane to rows 0 to 2 of `lanes`: aa, ab, bb.
 
-    It is R^T S between the rest axes a and b, over their extents: the identity at rest.
+    The stretch is R^T S between the rest axes a and b, over their extents: the identity at rest.
     """
     axes, shares = planes.axes, planes.shares
     for k in range(size):
@@ -197,12 +197,13 @@ def _stretch(lanes: Floats, size: int, planes: Planes, first: int) -> None:
 
 @kernel
 def _volume_scales(lanes: Floats, size: int, gain: float) -> None:
-    """From stretches in rows 0 to 2 of `lanes` the scale s, V less `off` (aa, ab, bb), and `off`.
+    """Replace stretches in rows 0 to 2 of `lanes` by s, V minus `off` (aa, ab, bb), and `off`.
 
     With the eigenvectors u and v of the stretch, the axis is W = q u u^T + (1 - q) v v^T; q is the
-    share of the larger strain in the sum of both, each to the power of 16. It is one but where both
-    are nearly as large: there an axis would flicker. In the plane V is c I + (g - c) W, and off it
-    what makes its determinant one: c as well where q is one, as in the paper.
+    share of the larger strain in the sum of both, each to the power of 16. So q is one except where
+    both strains are nearly equal, where a single axis would flicker. In the plane V is
+    c I + (g - c) W. Across the plane V is the number that makes the determinant one: also c where q
+    is one, as in the paper.
 
     Source: Celikcan et al. 2015, eqs. (8), (10) and (12), with s' = 1 + gain (s - 1).
     """

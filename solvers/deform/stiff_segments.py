@@ -1,13 +1,12 @@
-"""Which parts of a character are stiff and where it bends: a segmentation along its skeleton.
+"""Cuts a surface along its skeleton into stiff segments, such as upper and lower arms.
 
-Each limb is cut into segments at nodes of its skeleton: where it turns most, and never so closely
-that nothing stiff would be left between two joints. A curve skeleton has a node every radius or so,
-a rig one where an anatomist puts it; both come out as upper and lower arms. The inner ends of limbs
-(`solvers.skeleton.limbs.bones_in_trunk`) and the forks that they meet in make up the trunk, which
-is one.
+Each limb is cut at nodes of its skeleton where it turns most, but never so closely that two joints
+leave nothing stiff between them. A curve skeleton has a node about every radius, a rig one at each
+anatomical joint; both give upper and lower arms. The inner ends of limbs
+(`solvers.skeleton.limbs.bones_in_trunk`) and the forks where they meet are one segment, the trunk.
 
-A segment is rigid but near its borders, where rigidity falls to zero within a limb's radius along
-the surface. The segments are what `solvers.arap.ArapSolver.stiffen` takes.
+A segment is rigid except near its borders, where rigidity falls to zero within a limb's radius
+along the surface. `solvers.arap.ArapSolver.stiffen` takes the segments.
 """
 
 from __future__ import annotations
@@ -27,10 +26,10 @@ from solvers.surface.edges import Edges
 
 SEGMENT = 2.5  # the least length of a segment, in radii of its limb
 JOINT = 1.0  # how far to each side of a border a surface bends, in radii of the thinner side
-CROWD = 0.1  # [rad] what a joint is worth where a limb is straight
-STOUT = 0.6  # of the thickest part's radius: what is thinner is a limb, not a body
-DETOUR = 2.0  # how much longer than a straight line a way along edges may be
-FAR = 2.2  # radii of a limb from its first bones: what is farther is the body it grows from
+CROWD = 0.1  # [rad] the value of a joint where a limb is straight
+STOUT = 0.6  # of the thickest part's radius: a thinner part is a limb, not a body
+DETOUR = 2.0  # a path along edges may be so many times as long as a straight line
+FAR = 2.2  # radii of a limb from its first bones: a vertex farther away belongs to the trunk
 FRAGMENT = 0.1  # of its region, the least area of a piece of surface that is kept as its own
 
 Array = NDArray[np.float64]
@@ -84,8 +83,10 @@ def find_stiff_segments(  # noqa: PLR0917
 
 
 class _Segments(NamedTuple):
-    """G regions: of the bone that ends at each node (K,), their radii (G,), and where surface goes
-    that is too far from its bone to be of the limb (G,).
+    """G regions of a skeleton.
+
+    `region_of_bone` (K,) is the region of the bone that ends at each node, `radius` (G,) each
+    region's radius, and `trunk_at` (G,) the region of vertices too far from the limb's bones.
     """
 
     region_of_bone: Indices
@@ -105,7 +106,7 @@ def _segments(
     chains = limbs(parents)
     radii = [_median(distance[np.isin(bones, chain[1:])], distance) for chain in chains]
     thick = max([_median(distance[inside[bones]], np.zeros(1)), *radii], default=0.0)
-    # A fork's region has the fork's own number; those of segments follow.
+    # A fork's region has the number of the fork; the numbers of segments follow.
     region_of_bone = np.full(len(parents), root, dtype=np.int64)
     radius_of = [thick] * len(parents)
     trunk_of = np.arange(len(parents))
@@ -141,7 +142,7 @@ def _is_trunk(points: Array, radius: float, thick: float) -> bool:
 
 
 def _joints(points: Array, radius: float) -> list[int]:
-    """Which inner points of a polyline (n, 3) are joints: those of the largest sum of turns.
+    """The inner points of a polyline (n, 3) that are joints: those with the largest sum of turns.
 
     Two joints, and a joint and an end, are at least `SEGMENT` radii apart.
     """
@@ -166,7 +167,7 @@ def _joints(points: Array, radius: float) -> list[int]:
 
 
 def _turns(points: Array, along: Array, radius: float) -> Array:
-    """How much a polyline turns [rad] within a radius of each of its points (n,)."""
+    """The turn [rad] of a polyline within a radius of each of its points (n,)."""
 
     def at(places: Array) -> Array:
         return np.stack([np.interp(places, along, points[:, axis]) for axis in range(3)], axis=1)
@@ -186,12 +187,12 @@ def _edge_graph(vertices: Array, faces: Indices) -> csr_array:
 def _without_fragments(
     region_of: Indices, graph: csr_array, vertices: Array, faces: Indices
 ) -> Indices:
-    """Give small pieces of a region that the surface parts from the rest to what they lie in."""
+    """Move small pieces of a region, apart from its rest, to the regions around them."""
     a, b, c = (vertices[faces[:, corner]] for corner in range(3))
     area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 6.0
     areas = np.bincount(faces.ravel(), np.repeat(area, 3), minlength=len(vertices))
     region_of = region_of.copy()
-    for _ in range(3):  # a fragment may have lain in a fragment
+    for _ in range(3):  # a fragment may lie within a fragment
         tails, heads = graph.nonzero()
         same = region_of[tails] == region_of[heads]
         within = coo_array((same[same], (tails[same], heads[same])), shape=graph.shape)
@@ -217,7 +218,7 @@ def _without_fragments(
 
 
 def _rigidity(region_of: Indices, radii: Array, graph: csr_array, vertices: Array) -> Array:
-    """How rigid each vertex is: by its distance to the borders, in radii of the thinner side."""
+    """The rigidity of each vertex by its distance to the borders, in radii of the thinner side."""
     tails, heads = graph.nonzero()
     crossing = region_of[tails] != region_of[heads]
     tails, heads = tails[crossing], heads[crossing]

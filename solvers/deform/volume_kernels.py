@@ -17,20 +17,20 @@ from numpy.typing import NDArray
 from solvers.kernels.compiled import kernel, parallel_kernel
 from solvers.linear.laplacian import Floats
 
-# The most that a pressure may mend, in mean strains of the component times its volume. What no
-# squash explains (a bend loses volume too) is then not pumped into the little that is squashed.
+# The most volume that a pressure may restore, as a multiple of the component's mean strain times
+# its volume. A bend loses volume too, which must not be pumped into the few squashed cells.
 _MOST = 3.0
 
 _TINY = 1e-300
 
 
 class ClosedShells(NamedTuple):
-    """The closed surfaces whose volumes are kept; a named tuple, because kernels take one as it is.
+    """The closed surfaces whose volumes are kept; a named tuple, because kernels accept those.
 
-    Faces (F, 3) lie component by component, with fans over holes, which have no area; chunk c is
-    the faces from `chunks[c]` to `chunks[c + 1]`, all of the component `parts[c]`, whose volume is
-    taken from its vertex `origins[c]`. Around vertex i lie the `pairs` (3 F', 2) from `corners[i]`
-    to `corners[i + 1]`: the other two vertices of each of its faces, in order, without the fans.
+    Faces (F, 3) are ordered by component and include fans over holes, which have area 0. Chunk c
+    holds the faces from `chunks[c]` to `chunks[c + 1]`, all of component `parts[c]`; its volume is
+    measured from vertex `origins[c]`. The `pairs` (3 F', 2) from `corners[i]` to `corners[i + 1]`
+    are the other two vertices of each face at vertex i, in order, without the fans.
     """
 
     faces: NDArray[np.uint32]
@@ -44,7 +44,7 @@ class ClosedShells(NamedTuple):
 
 @parallel_kernel
 def strain_cells(scales: Floats, out: Floats) -> None:
-    """How far each cell is from its rest length, |s - 1/s| / 2, out (N,)."""
+    """The strain of each cell, |s - 1/s| / 2, out (N,)."""
     for i in prange(len(out)):
         out[i] = 0.5 * abs(scales[i] - 1.0 / scales[i])
 
@@ -53,9 +53,9 @@ def strain_cells(scales: Floats, out: Floats) -> None:
 def push(
     x: Floats, shell: ClosedShells, strains: Floats, fixed: NDArray[np.bool_], out: Floats
 ) -> None:
-    """How a pressure pushes the vertices, out (N, 3): area vectors times the strain of their cells.
+    """The direction in which a pressure moves each vertex, out (N, 3): area vector times strain.
 
-    An area vector is the gradient of the volume. Fixed vertices are not pushed.
+    An area vector is the gradient of the volume. Fixed vertices do not move.
     """
     corners, pairs = shell.corners, shell.pairs
     for index in prange(len(out)):
@@ -77,10 +77,10 @@ def push(
 
 @parallel_kernel
 def volume_terms(x: Floats, g: Floats, shell: ClosedShells, strains: Floats, out: Floats) -> None:
-    """What each chunk of the shell adds to its component's volume, out (chunks, 5).
+    """The part of each chunk in its component's volume, out (chunks, 5).
 
-    Columns 0 to 3 are the volume of x + m g as a polynomial in m, constant first; 4 the strains of
-    the cells, times the rest areas on them.
+    Columns 0 to 3 are the volume of x + m g as a polynomial in m, constant first; column 4 is the
+    sum of the cells' strains times their rest areas.
     """
     faces, chunks, origins, areas = shell.faces, shell.chunks, shell.origins, shell.areas
     for chunk in prange(len(chunks) - 1):
@@ -132,7 +132,7 @@ def add_scaled(pressures: Floats, part_of: NDArray[np.int64], g: Floats, x: Floa
 
 @kernel
 def sum_parts(terms: Floats, parts: NDArray[np.int64], out: Floats) -> None:
-    """The terms of chunks (chunks, 5), each of the component in `parts`, summed into out (C, 5)."""
+    """Sum the terms of chunks (chunks, 5) by component; `parts` names each chunk's; out (C, 5)."""
     out[:] = 0.0
     for chunk in range(len(parts)):
         for term in range(5):
@@ -141,10 +141,15 @@ def sum_parts(terms: Floats, parts: NDArray[np.int64], out: Floats) -> None:
 
 @kernel
 def find_pressures(sums: Floats, rest: Floats, shape: Floats, gain: float, out: Floats) -> None:
-    """The pressure m in each component, out (C,), that gives its volume back, or `gain` of it.
+    """The pressure m in each component, out (C,), that restores the share `gain` of its volume.
 
-    From the sums (C, 5) of `volume_terms`, the volumes and areas at rest (C, 2), and the volumes of
-    the shape state (C,), which lead the way beyond one: what the shape state lost, gained.
+    Args:
+        sums: (C, 5) of `volume_terms`.
+        rest: (C, 2) volumes and areas at rest.
+        shape: (C,) volumes of the shape state. A gain above 1 adds volume in proportion to the
+            volume that the shape state lost.
+        gain: the share of the lost volume.
+        out: (C,).
     """
     for part in range(len(out)):
         out[part] = 0.0
@@ -163,8 +168,8 @@ def find_pressures(sums: Floats, rest: Floats, shape: Floats, gain: float, out: 
 
 @kernel
 def _first_root(slope: float, curve: float, twist: float, wanted: float) -> float:
-    """Where slope m + curve m^2 + twist m^3 is `wanted`, or as near as it comes before it turns."""
-    # Beyond here it has lost its slope but for a quarter, and is about to turn.
+    """The m where slope m + curve m^2 + twist m^3 is `wanted`, or nearest before its extremum."""
+    # At `farthest` only a quarter of the slope is left, so the extremum is near.
     lost = 0.75 * slope
     bend = curve if wanted > 0.0 else -curve
     spread = bend * bend - 3.0 * twist * lost

@@ -1,15 +1,16 @@
-"""Level-of-detail hierarchy of a skeleton: the sub-trees that a performer may be matched to.
+"""Level-of-detail hierarchy of a skeleton: the sub-trees that a performer can be matched with.
 
 Source: AniMesh (Jin et al. 2015), section 4.1.
 
-Leaf chains collapse to one node each (steps 1 and 2), branch nodes with at most one neighbour that
-is not such a leaf root a sub-tree (step 3), each sub-tree becomes a leaf in turn (step 4), until a
-single node or a chain is left, which gives the root of all. Seen from that root every abstracted
-node depends on what hangs below it alone, so the positions and lengths of all levels come from one
-pass up the tree; the rounds only say which sub-tree belongs to which level.
+Each leaf chain collapses to one node (steps 1 and 2). A branch node with at most one neighbour that
+is not such a leaf is the root of a sub-tree (step 3). Each sub-tree then becomes a leaf itself
+(step 4), until a single node or a chain is left, which gives the root of the hierarchy. From that
+root, every abstracted node depends only on the nodes below it. So one pass up the tree gives the
+positions and lengths of all levels; the rounds only assign sub-trees to levels.
 
-Beyond the paper: a sub-tree is also offered *unfolded* (the word of section 5.2), with the limbs of
-its larger inner sub-trees as branches of their own, so that a whole body can meet a whole body.
+Beyond the paper: each sub-tree also occurs *unfolded* (the word of section 5.2), with the limbs of
+its larger inner sub-trees as separate branches, so that a whole body can be matched with a whole
+body.
 """
 
 from __future__ import annotations
@@ -34,8 +35,8 @@ from solvers.skeleton.tree import Tree
 
 Array = NDArray[np.float64]
 
-# Unfolding opens inner sub-trees from the largest down to this share of the whole, those together
-# that are as large as one another up to this factor: both hands, not first one and then the other.
+# Unfolding opens inner sub-trees from the largest down to _SMALLEST of the whole. Sub-trees whose
+# sizes agree up to the factor _ALIKE open together: both hands, not one hand after the other.
 _SMALLEST: Final = 0.08
 _ALIKE: Final = 0.97
 
@@ -45,14 +46,14 @@ class SubTree:
     """A part of a skeleton as one candidate for matching.
 
     Attributes:
-        root: the node that it hangs on.
-        centre: the node that its branches are seen from: the root; unfolded, that node between the
-            opened forks which is nearest to the branches' centre of mass.
-        level: round of section 4.1 in which it was found, from 1 (small parts) up.
-        branches: what hangs on it.
-        stem: node ids from the next fork towards the whole's root down to `root`; () at the top.
-        unfolding: 0 as the paper folds it, then 1, 2, ... the more inner sub-trees are opened.
-        coarser: how many branches the unfolding before this one has; 0 if this is the first.
+        root: the node at which it is attached.
+        centre: the origin of its branches: the root; unfolded, the node between the opened forks
+            that is nearest to the branches' centre of mass.
+        level: the round of section 4.1 in which it was found, from 1 (small parts) up.
+        branches: its branches.
+        stem: node ids from the next fork (towards the hierarchy's root) to `root`; () at the top.
+        unfolding: 0 as the paper folds it, then 1, 2, ... with more inner sub-trees opened.
+        coarser: the number of branches of the unfolding before this one; 0 for the first.
         body_plan: whether only sub-trees of the body plan (`BODY_PLAN`) are opened.
     """
 
@@ -68,7 +69,7 @@ class SubTree:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Hierarchy:
-    """All sub-trees of a skeleton over all levels, and the root they led to."""
+    """All sub-trees of a skeleton over all levels, and the root of the hierarchy."""
 
     tree: Tree
     root: int
@@ -76,7 +77,7 @@ class Hierarchy:
 
 
 def abstract(tree: Tree, root: int | None = None) -> Hierarchy:
-    """Level-of-detail hierarchy of `tree`; its root is found unless given.
+    """Return the level-of-detail hierarchy of `tree`; its root is found unless given.
 
     Source: AniMesh, section 4.1, steps 1 to 4 and the choice of the global root.
     """
@@ -98,10 +99,10 @@ def abstract(tree: Tree, root: int | None = None) -> Hierarchy:
 
 
 def find_root(tree: Tree, root: int | None = None) -> tuple[int, dict[int, int]]:
-    """Root of the hierarchy, and for each branch node the round in which it roots a sub-tree.
+    """Return the hierarchy's root, and for each branch node the round of its sub-tree.
 
-    Source: AniMesh, section 4.1: the node that remains, or on a remaining chain the node nearest
-    to the centre of mass.
+    Source: AniMesh, section 4.1: the root is the remaining node, or the node of the remaining chain
+    that is nearest to the centre of mass.
     """
     around = _fork_graph(tree, root)
     levels: dict[int, int] = {}
@@ -143,10 +144,10 @@ def _fork_graph(tree: Tree, root: int | None) -> dict[int, set[int]]:
 
 
 def _last_neighbour(oriented: Tree, levels: dict[int, int], fork: int) -> int | None:
-    """The child of the root `fork` that leads to the other end of the chain that remained.
+    """The child of the root `fork` that leads to the other end of the remaining chain.
 
-    Both ends of the last chain root a sub-tree in the same round; where the global root falls on
-    one of them, the way to the other is not part of that end's own sub-tree.
+    Both ends of the last chain are roots of sub-trees of the same round. If one of them is the
+    global root, the way to the other end is no part of its own sub-tree.
     """
     if fork != oriented.root:
         return None
@@ -159,7 +160,7 @@ def _last_neighbour(oriented: Tree, levels: dict[int, int], fork: int) -> int | 
 
 
 def _unfoldings(folding: Folding, top: int, level: int, excluded: int | None) -> list[SubTree]:
-    """The sub-tree at `top` as the paper folds it, then with its larger inner sub-trees opened."""
+    """The sub-tree at `top` as the paper folds it, then with larger inner sub-trees opened."""
     tree = folding.tree
     stem = [top]
     while tree.parents[stem[-1]] >= 0 and (len(stem) == 1 or len(tree.children[stem[-1]]) == 1):
@@ -179,10 +180,10 @@ def _unfoldings(folding: Folding, top: int, level: int, excluded: int | None) ->
 
 
 def _openings(folding: Folding, top: int, excluded: int | None) -> list[float]:
-    """Shares of the whole at which one more group of inner sub-trees opens, descending."""
+    """The shares of the whole at which another group of inner sub-trees opens, descending."""
     heights = folding.tree.heights
     forks = unfold(folding, top, _SMALLEST, excluded).forks
     whole = max(heights[top], 1e-300)
     shares = sorted((float(heights[fork] / whole) for fork in forks[1:]), reverse=True)
     last = [here for here, after in pairwise([*shares, 0.0]) if after < _ALIKE * here]
-    return [share * (1.0 - 1e-9) for share in last]  # so that rounding leaves none shut
+    return [share * (1.0 - 1e-9) for share in last]  # so that rounding keeps none closed

@@ -1,11 +1,11 @@
-"""The best assignments over many small tables at once, in order, without listing all of them.
+"""Lists the best assignments of rows to columns over many small tables, best first.
 
 For each choice of columns only its best permutation counts, as in AniMesh (Jin et al. 2015),
 section 4.2. Each table's best choice is a linear assignment (Kuhn 1955, shortest augmenting paths);
 the next ones follow by splitting the remaining choices at the columns of the one just taken (Lawler
 1972): "without its first column", "with its first but without its second", and so on, each again a
-linear assignment. So the first k of the C(n, m) choices cost at most k m assignments and come out
-exactly as if all m! C(n, m) had been listed. Tables wait under an upper bound until it leads.
+linear assignment. So the first k of the C(n, m) choices cost at most k m assignments, and are
+exactly those of a list of all m! C(n, m). A table is solved only when its upper bound comes first.
 """
 
 from __future__ import annotations
@@ -24,16 +24,16 @@ _BARRED = 1e3  # outweighs any sum of values
 
 @kernel
 def rank_assignments(values: Array, starts: Ints, limit: int) -> tuple[Ints, Ints, Array]:
-    """The `limit` best assignments of rows to columns over all tables, best first.
+    """Return the `limit` best assignments of rows to columns over all tables, best first.
 
     Args:
         values: (m, T) the tables side by side, each entry well below 100 in size.
         starts: (C + 1,) first column of each table and the end of the last; at most
             `MOST_COLUMNS` (and rows) each.
-        limit: how many at most.
+        limit: the most assignments.
 
     Returns:
-        the table of each of the n assignments (n,); the column within it that each row takes
+        The table of each of the n assignments (n,); the column within it that each row takes
         (n, m), -1 for none; the sums (n,). A table with fewer columns than rows uses all of them.
         Equal sums come in the order of the tables.
     """
@@ -87,7 +87,7 @@ def _uses(columns: Ints, position: int, block: Array) -> bool:
 
 @kernel
 def _bound(block: Array) -> float:
-    """Upper bound of a table's best assignment: the best of each row (column, if those are few)."""
+    """Upper bound of a table's best assignment: the sum of the best of each row (or column)."""
     wide = block if block.shape[0] <= block.shape[1] else block.T
     total = 0.0
     for i in range(wide.shape[0]):

@@ -1,4 +1,4 @@
-"""The motions of all the chains of a body, carried over to a character in one call a frame."""
+"""Transfers the motions of all chains of a body to a character's chains in one call a frame."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ Ints = NDArray[np.int64]
 
 
 class _Chains(NamedTuple):
-    """`ChainMap`s one after another; rows first[d] to first[d + 1] are chain d's."""
+    """Several `ChainMap`s in common arrays; rows first[d] to first[d + 1] belong to chain d."""
 
     first_bone: Ints  # (D + 1,)
     first_sample: Ints  # (D + 1,)
-    joints: Ints  # (B + D,) where a body has the nodes of the sources
+    joints: Ints  # (B + D,) the body's joints that are the sources' nodes
     rest: Array  # (B, 3)
     axes: Array  # (D, 3)
     bones: Ints  # (S, 2)
@@ -32,7 +32,7 @@ class _Chains(NamedTuple):
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ChainRetargetsState:
-    """What the next frame's rotations depend on, besides the pose.
+    """The memory of `ChainRetargets` at one moment.
 
     Attributes:
         turns: (B, 4) each source bone's turn against its predecessor, zero before the first frame.
@@ -44,17 +44,17 @@ class ChainRetargetsState:
 
 
 class ChainRetargets:
-    """Carries D motions of one body over to as many target polylines, frame by frame.
+    """Transfers D motions of one body to as many target polylines, frame by frame.
 
-    Rotations are measured in the body's world, and given in the targets': a limb on a spine that
-    bends already holds the spine's turn.
+    Rotations are measured in the body's world and returned in the targets' world. So the rotation
+    of a limb on a bent spine includes the spine's turn.
 
     Args:
-        maps: how each chain's motion is carried over.
-        sources: for each, the joints of the body that are its source's nodes.
+        maps: how each chain's motion is transferred.
+        sources: for each chain, the body's joints that are its source's nodes.
 
     Raises:
-        ValueError: a source that has not one joint for each of its nodes.
+        ValueError: the number of joints of a source differs from its number of nodes.
     """
 
     def __init__(self, maps: Sequence[ChainMap], sources: Sequence[Sequence[int]]) -> None:
@@ -80,7 +80,7 @@ class ChainRetargets:
         self._turns[:] = 0.0
 
     def snapshot(self) -> ChainRetargetsState:
-        """Return a copy of what the last frame left behind."""
+        """Return a copy of the memory of the last frame."""
         return ChainRetargetsState(self._turns.copy(), self._last.copy())
 
     def restore(self, state: ChainRetargetsState) -> None:
@@ -96,11 +96,11 @@ class ChainRetargets:
         self._turns[:], self._last[:] = state.turns, state.last
 
     def rotations(self, body: Array, gains: Array) -> Array:
-        """World rotations (S, 4) of all target bones from rest, chain after chain.
+        """Return world rotations (S, 4) of all target bones from rest, chain after chain.
 
         Args:
-            body: (J, 3) where the body's joints are, finite.
-            gains: (D,) the share of each chain's turns that is carried over, in (0, 1].
+            body: (J, 3) positions of the body's joints, finite.
+            gains: (D,) the share of each chain's turns that is transferred, in (0, 1].
 
         Raises:
             ValueError: a joint or a gain is missing.

@@ -1,4 +1,4 @@
-"""The branches of a rooted tree, with all that hangs on a branch folded into its end.
+"""The branches of a rooted tree, with the sub-tree at each branch's end folded into one node.
 
 Source: AniMesh (Jin et al. 2015), section 4.1, steps 1, 2 and 4.
 """
@@ -17,13 +17,13 @@ from solvers.skeleton.tree import Tree
 
 Array = NDArray[np.float64]
 
-# A fork is part of the body plan if what hangs on it reaches this share of the whole: a chest or a
-# pelvis is, a wrist with its fingers or a face is not.
+# A fork belongs to the body plan if its sub-tree reaches this share of the whole: a chest or a
+# pelvis does, a wrist with its fingers or a face does not.
 BODY_PLAN: Final = 0.25
-# A side chain shorter than this share of the whole is a spur of the extraction or a twist joint.
+# A shorter side chain, as a share of the whole, is a spur of the extraction or a twist joint.
 SPUR: Final = 0.1
-# Where the second limb of a fork is shorter than this share of the first, the first goes on through
-# it: a wing past its feathers, an arm past a twist joint.
+# If the second limb of a fork is shorter than this share of the first, the first limb continues
+# through the fork: a wing past its feathers, an arm past a twist joint.
 _SIDE: Final = 0.4
 
 
@@ -32,13 +32,13 @@ class Branch:
     """One branch of a sub-tree.
 
     Attributes:
-        fork: the branch node that it belongs to.
-        chain: node ids from there (a short side chain: from the limb that it hangs on) to its leaf
-            or to the root of the sub-tree that was abstracted into its leaf (q of figure 5).
-        extension: node ids that lead on from there along the longest chain to a leaf; () at a leaf.
-        position: abstracted position of the branch's end (step 2 and 4), shape (3,) for a tree; for
-            other per-node values, that weighted mean of theirs.
-        length: accumulated length of all chains in the branch.
+        fork: the branch node to which it belongs.
+        chain: node ids from the fork (for a short side chain: from its limb) to the leaf, or to
+            the root of the sub-tree that was abstracted into the leaf (q of figure 5).
+        extension: node ids from there along the longest chain to a leaf; () at a leaf.
+        position: abstracted position of the branch's end (steps 2 and 4), shape (3,) for a tree;
+            for other per-node values their weighted mean.
+        length: total length of all chains in the branch.
     """
 
     fork: int
@@ -49,9 +49,9 @@ class Branch:
 
 
 class Folding:
-    """Abstracted positions and accumulated lengths of all that hangs on each node of a rooted tree.
+    """Abstracted positions and total lengths of the sub-trees at all nodes of a rooted tree.
 
-    `values` (K, d) are averaged as positions are; the identity gives the averaging weights.
+    `values` (K, d) are averaged like positions; the identity gives the averaging weights.
     """
 
     def __init__(self, tree: Tree, values: Array) -> None:
@@ -68,19 +68,19 @@ class Folding:
                 self._lengths[node] = lengths.sum()
 
     def branch(self, fork: int, chain: tuple[int, ...]) -> Branch:
-        """The branch of `fork` along `chain`, with all that hangs on its end folded into that."""
+        """Return the branch of `fork` along `chain`, with the sub-tree at its end folded."""
         position, length = self._collapse(chain)
         return Branch(fork, chain, self._longest(chain[-1]), position, length)
 
     def walk(self, fork: int, child: int) -> tuple[int, ...]:
-        """Nodes from `fork` over `child` to the next leaf or branch node (step 1)."""
+        """Return the nodes from `fork` over `child` to the next leaf or branch node (step 1)."""
         chain = [fork, child]
         while len(ahead := self.tree.children[chain[-1]]) == 1:
             chain.append(ahead[0])
         return tuple(chain)
 
     def walk_limb(self, fork: int, child: int, shortest: float) -> tuple[int, ...]:
-        """Nodes from `fork` over `child` to where the limb ends or splits, past side chains."""
+        """The nodes from `fork` over `child` to the limb's end or split, over side chains."""
         chain = [fork, child]
         while ahead := self.tree.children[chain[-1]]:
             if len(ahead) > 1:
@@ -92,14 +92,14 @@ class Folding:
         return tuple(chain)
 
     def limbs(self, node: int, shortest: float) -> tuple[int, ...]:
-        """The children of `node` over which a leaf at least `shortest` away is reached."""
+        """Return the children of `node` that lead to a leaf at least `shortest` away."""
         return tuple(child for child in self.tree.children[node] if self.reach[child] >= shortest)
 
     def _collapse(self, chain: tuple[int, ...]) -> tuple[Array, float]:
         """Position and accumulated length of a chain as one node (steps 1, 2 and 4).
 
-        An inner node weighs what its outgoing bone is long, a sub-tree folded into the end what
-        was accumulated in it; a leaf has neither and counts only where nothing else does.
+        The weight of an inner node is the length of its outgoing bone, that of a folded sub-tree
+        its total length. A leaf has weight 0 and counts only if all weights are 0.
         """
         end, bones = chain[-1], self.tree.bone_lengths[list(chain[1:])]
         points = np.concatenate([self._own[list(chain[1:-1])], self._ends[[end]]])
@@ -116,7 +116,7 @@ class Folding:
 
 
 def fold(folding: Folding, top: int, excluded: int | None = None) -> tuple[Branch, ...]:
-    """The branches of the sub-tree at `top`, without the child `excluded` (step 3)."""
+    """Return the branches of the sub-tree at `top`, without the child `excluded` (step 3)."""
     children = (child for child in folding.tree.children[top] if child != excluded)
     return tuple(folding.branch(top, folding.walk(top, child)) for child in children)
 
@@ -127,8 +127,8 @@ class Limbs:
 
     Attributes:
         branches: the limbs.
-        sides: what hangs on the way, beside a limb or between forks, and is much shorter.
-        forks: the nodes that the limbs hang on, the sub-tree's root first.
+        sides: much shorter chains beside a limb or between forks.
+        forks: the nodes at which the limbs begin, the sub-tree's root first.
     """
 
     branches: tuple[Branch, ...]
@@ -137,12 +137,12 @@ class Limbs:
 
 
 def unfold(folding: Folding, top: int, opening: float, excluded: int | None = None) -> Limbs:
-    """The limbs of the sub-tree at `top` with inner sub-trees opened.
+    """Return the limbs of the sub-tree at `top` with inner sub-trees opened.
 
     Args:
-        folding: of a rooted tree.
+        folding: the folding of a rooted tree.
         top: the root of the sub-tree.
-        opening: inner sub-trees are opened that reach at least this share of the whole one.
+        opening: inner sub-trees of at least this share of the whole sub-tree are opened.
         excluded: a child of `top` that does not belong to the sub-tree.
     """
     heights = folding.tree.heights
@@ -168,13 +168,13 @@ def unfold(folding: Folding, top: int, opening: float, excluded: int | None = No
 
 
 def nearest_node(tree: Tree, nodes: Sequence[int], point: Array) -> int:
-    """That one of `nodes` which lies nearest to `point`."""
+    """Return the one of `nodes` that is nearest to `point` (3,)."""
     distances = np.linalg.norm(tree.positions[list(nodes)] - point, axis=1)
     return nodes[int(np.argmin(distances))]
 
 
 def centre_node(tree: Tree, forks: Sequence[int], ends: Array, branches: Sequence[Branch]) -> int:
-    """The node between `forks` nearest to the centre of mass of branches with abstracted `ends`."""
+    """Return the node between `forks` nearest to the mean of the branches' abstracted `ends`."""
     inner = sorted({node for fork in forks for node in tree.chain(forks[0], fork)})
     if not branches:
         return forks[0]
@@ -182,6 +182,6 @@ def centre_node(tree: Tree, forks: Sequence[int], ends: Array, branches: Sequenc
 
 
 def weighted_mean(points: Array, weights: Array) -> Array:
-    """Mean (d,) of points (n, d) by weights (n,); the plain mean where all weights are zero."""
+    """Return the mean (d,) of points (n, d) by weights (n,), unweighted if all are zero."""
     mean: Array = weights @ points / weights.sum() if weights.any() else points.mean(axis=0)
     return mean

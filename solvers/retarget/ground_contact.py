@@ -1,4 +1,4 @@
-"""Where a character stands: its whole turned about the vertical, and kept above the floor."""
+"""Turns a whole character about the vertical and keeps it above the floor."""
 
 from __future__ import annotations
 
@@ -14,19 +14,20 @@ Array = NDArray[np.float64]
 
 
 def place_on_floor(points: Array, angle: float, about: Array, lift: float, out: Array) -> float:
-    """Put points (N, 3) [m], turned as by `heading.turned` and then lifted, into `out` (N, 3).
+    """Turn points (N, 3) [m] about the vertical, lift them, and write them to `out` (N, 3).
 
-    Nothing may sink into the floor, y = 0: what pushes against it lifts the whole.
+    The turn is that of `heading.turned`. No point may be below the floor, y = 0: the lowest point
+    raises all points if necessary.
 
     Args:
         points: (N, 3) [m], N > 0.
-        angle: [rad] about the vertical through `about` (3,) [m].
-        about: what is turned about.
-        lift: [m] how far they rise at least.
-        out: where they are put; not `points` itself.
+        angle: [rad] about the vertical through `about`.
+        about: (3,) [m].
+        lift: [m] the least rise.
+        out: (N, 3), not `points` itself.
 
     Returns:
-        How far they rise [m].
+        The rise [m].
     """
     return _place_on_floor(points, math.cos(angle), math.sin(angle), about, lift, out)
 
@@ -48,7 +49,7 @@ def _place_on_floor(  # noqa: PLR0917
 
 
 def turned_rotations(rotations: Array, angle: float) -> Array:
-    """World rotations (K, 4), unit quaternions, turned on by `angle` [rad] about the vertical."""
+    """Turn world rotations (K, 4), unit quaternions, about the vertical by `angle` [rad]."""
     out = np.empty_like(rotations)
     _turn_on(rotations, math.cos(0.5 * angle), math.sin(0.5 * angle), out)
     return out

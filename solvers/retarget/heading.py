@@ -1,8 +1,8 @@
-"""Which way a performer faces, so that a turn of the whole body is told from a move of a limb.
+"""The direction that a performer faces, which separates turns of the body from motions of limbs.
 
-AniMesh measures a limb's turns against the capture device. A performer who turns round would then
-swing both arms through the character's body; so the heading is taken out of the pose before the
-limbs are retargeted, and given to the character as a whole where all of it is driven.
+AniMesh measures the turns of a limb against the capture device. A performer who turns round would
+then swing both arms through the character's body. So the heading is removed from the pose before
+the limbs are retargeted, and turns the whole character where all of it is driven.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from solvers.kernels.compiled import kernel
 
 Array = NDArray[np.float64]
 
-LEVEL = 0.3  # least horizontal share of the left-right axis for a heading to be read from it
+LEVEL = 0.3  # least horizontal share of the left-right axis that gives a heading
 
 
 def heading(positions: Array, pairs: NDArray[np.int64], before: float = 0.0) -> float:
-    """Angle about +Y by which a body has turned from facing +Z.
+    """Return the angle about +Y by which a body has turned from facing +Z.
 
     Args:
         positions: (J, 3) [m], +Y up.
         pairs: (P, 2) indices of left and right joints of hips and shoulders; a body that faces +Z
             has its left at +X.
-        before: the heading one frame earlier [rad]; the answer is the nearest to it among those
-            that differ by whole turns, and `before` itself when the body lies on its side.
+        before: [rad] the heading one frame earlier. Of the angles that differ by whole turns, the
+            answer is the nearest to it; it is `before` itself when the body lies on its side.
 
     Returns:
         The heading [rad], 0 facing +Z, positive to the body's left.
@@ -42,7 +42,7 @@ def heading(positions: Array, pairs: NDArray[np.int64], before: float = 0.0) -> 
 
 @kernel
 def _across(positions: Array, pairs: NDArray[np.int64]) -> tuple[float, float, float]:
-    """From the right joints to the left ones, summed."""
+    """The sum of the vectors from right joints to left joints."""
     x = y = z = 0.0
     for left, right in pairs:
         x += positions[left, 0] - positions[right, 0]
@@ -52,7 +52,7 @@ def _across(positions: Array, pairs: NDArray[np.int64]) -> tuple[float, float, f
 
 
 def turned(positions: Array, angle: float, about: Array) -> Array:
-    """Positions (n, 3) turned by `angle` [rad] about the vertical through `about` (3,)."""
+    """Return positions (n, 3) turned by `angle` [rad] about the vertical through `about` (3,)."""
     out = np.empty(positions.shape)
     _turn(np.ascontiguousarray(positions), math.cos(angle), math.sin(angle), about, out)
     return out

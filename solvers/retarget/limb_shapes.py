@@ -1,8 +1,8 @@
-"""How alike polylines look on the screen, bone by bone; and which poses of many differ most.
+"""Compares the shapes of limbs on the screen, and picks the most different of many poses.
 
-The score of AniMesh section 4.2 compares where branches lead as a whole; a bent arm and a straight
-one score the same. Where one of many poses is to become the rest state, from which the target's
-own rest shape is turned, the shapes of the limbs should agree as well.
+The score of AniMesh section 4.2 compares only the overall directions of branches; a bent arm and a
+straight one score the same. For the choice of a rest state, from which the target's own rest shape
+is turned, the shapes of the limbs should agree as well.
 """
 
 from __future__ import annotations
@@ -10,17 +10,17 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-SAMPLES = (np.arange(8) + 0.5) / 8.0  # of the unit arc length
+SAMPLES = (np.arange(8) + 0.5) / 8.0  # unit arc-length parameters
 
 Array = NDArray[np.float64]
 
 
 def shape_likeness(source: Array, target: Array, source_view: Array, target_view: Array) -> float:
-    """Mean cosine between the directions of two polylines on the screen, in [-1, 1].
+    """Return the mean cosine between the directions of two polylines on the screen, in [-1, 1].
 
     Args:
         source: (P, 3) nodes from the root outward.
-        target: (Q, 3) likewise.
+        target: (Q, 3) nodes from the root outward.
         source_view: (3, 3) rotation from the source's world to its capture device.
         target_view: (3, 3) rotation from the target's world to its camera.
     """
@@ -30,11 +30,11 @@ def shape_likeness(source: Array, target: Array, source_view: Array, target_view
 
 
 def most_different_poses(poses: Array, wanted: int) -> NDArray[np.int64]:
-    """Indices, rising, of poses far from each other: the extremes of a motion come first.
+    """Return the ascending indices of poses that differ most, such as the extremes of a motion.
 
     Args:
         poses: (T, n, 3) points of each pose, T >= 1.
-        wanted: how many, at most.
+        wanted: the most poses.
 
     Source: Gonzalez 1985, farthest-first traversal.
     """
@@ -49,7 +49,7 @@ def most_different_poses(poses: Array, wanted: int) -> NDArray[np.int64]:
 
 
 def _directions(points: Array) -> Array:
-    """Direction on the screen (n, 2) at each of SAMPLES; short where it leads into the depth."""
+    """Direction on the screen (n, 2) at each of SAMPLES; short where a bone points into depth."""
     bones = np.diff(points, axis=0)
     lengths = np.linalg.norm(bones, axis=1)
     ends = np.cumsum(lengths)

@@ -1,4 +1,4 @@
-"""Keeps the shown match steady while a performer's noisy pose re-ranks the matches every frame."""
+"""Keeps the shown match steady although a noisy pose re-ranks the matches in every frame."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from solvers.matching import Match
 
 @dataclass(frozen=True, slots=True)
 class MatchHysteresisState:
-    """Which match is shown, and since when another one is better.
+    """The memory of a `MatchHysteresis` at one moment.
 
     Attributes:
-        shown: the match that is shown, None before there was any.
+        shown: the shown match, None before the first.
         ranked: the last frame's matches, best first.
-        since: [s] when another match began to be better by the margin, None while none is.
-        pinned: whether a match was chosen by hand.
+        since: [s] the time since which another match differs by the margin, None without one.
+        pinned: whether the match was chosen by hand.
     """
 
     shown: Match | None
@@ -26,12 +26,12 @@ class MatchHysteresisState:
 
 
 class MatchHysteresis:
-    """Shows the match of one rank until another of that rank has differed by a margin for a while.
+    """Shows the match of one rank; changes it after another was better by a margin for some time.
 
     Args:
-        rank: which match to follow, 0 the best.
-        margin: by how much merits must differ to count.
-        hold: for how long without a break [s].
+        rank: the rank of the match to show, 0 for the best.
+        margin: the least difference of merits that counts.
+        hold: [s] for how long the difference must last without a break.
     """
 
     def __init__(self, rank: int = 0, *, margin: float = 0.15, hold: float = 0.5) -> None:
@@ -45,11 +45,11 @@ class MatchHysteresis:
 
     @property
     def shown(self) -> Match | None:
-        """The match to show; None before there was any."""
+        """The match to show; None before the first."""
         return self._shown
 
     def snapshot(self) -> MatchHysteresisState:
-        """Return what the next update depends on."""
+        """Return the memory that the next update depends on."""
         return MatchHysteresisState(self._shown, self._ranked, self._since, self.pinned)
 
     def restore(self, state: MatchHysteresisState) -> None:
@@ -58,11 +58,11 @@ class MatchHysteresis:
         self._since, self.pinned = state.since, state.pinned
 
     def update(self, ranked: Sequence[Match], time: float) -> Match | None:
-        """Take a frame's matches, best first, at `time` [s]; the match to show, with its new score.
+        """Take a frame's matches, best first, at `time` [s]; return the match to show.
 
-        Before there was any match, None. A shown match that is no longer listed counts as no
-        better than the last one listed. Time that steps back, as when a recording loops, starts
-        the waiting anew.
+        The match has its new score. The answer is None before the first match. A shown match that
+        is not in the list counts as no better than the last one in it. If time steps back, as when
+        a recording loops, the waiting time starts again.
         """
         self._ranked = tuple(ranked)
         if not self._ranked:
@@ -87,7 +87,7 @@ class MatchHysteresis:
         return self._shown
 
     def cycle(self, step: int) -> Match | None:
-        """Step by so many ranks from the shown match, round at the ends, and stay with that one."""
+        """Step by so many ranks from the shown match, round at the ends, and pin the new match."""
         if self._ranked:
             position = self._position(self._shown)
             if position is None:
@@ -97,7 +97,7 @@ class MatchHysteresis:
         return self._shown
 
     def release(self) -> None:
-        """After stepping by hand, let the pose choose again."""
+        """Undo the pin: the pose chooses the match again."""
         self.pinned = False
         self._since = None
 
@@ -106,7 +106,7 @@ class MatchHysteresis:
         self._since = None
 
     def _position(self, shown: Match | None) -> int | None:
-        """Rank of the shown match in the last frame."""
+        """The rank of the shown match in the last frame."""
         if shown is None:
             return None
         wanted = shown.root, shown.pairs

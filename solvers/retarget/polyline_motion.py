@@ -1,23 +1,23 @@
-"""Motion along a polyline, kept apart from how either polyline is sampled.
+"""Transfers the motion of one polyline to another, whatever the number of their bones.
 
 Source: AniMesh (Jin et al. 2015), sections 5.1 and 5.2, figure 4.
 
-A source bone i is turned from its rest by p_i, piecewise constant along the unit arc length s;
-q(s) joins them piecewise linearly, by slerp, and a target bone takes its sample of q, so that at
-each target node the limb turns by the difference of two samples. Three choices the paper leaves
-open or that we make otherwise, and why:
+Source bone i is rotated from rest by p_i, which is constant over the bone's part of the unit arc
+length s. The function q(s) interpolates the p_i piecewise linearly, by slerp. Each target bone
+takes a sample of q, so at each target node the limb turns by the difference of two samples. Three
+choices are left open by the paper or made differently here:
 
-- q passes through p_i at the middle of source bone i and is constant beyond the first and the last
-  middle: a bend is spread evenly to both sides of the joint that it comes from, and the turn of the
-  first bone happens at the root. A straight limb, raised, stays straight.
-- A target bone is sampled at its middle, the last one at s = 1: a target sampled as the source
-  takes over its pose exactly, and the turns along any target sum up to the source's total.
-- The basis follows the polyline's mean direction, which is the first bone's on a straight limb. A
-  first bone is often a stub across the body (pelvis to hip) or a sliver of an extracted curve;
-  the mean direction is what was matched on the screen and does not depend on the sampling.
+- q passes through p_i at the middle of source bone i and is constant before the first and after the
+  last middle. So a bend is spread evenly to both sides of its joint, and the turn of the first bone
+  happens at the root. A straight limb, raised, stays straight.
+- A target bone is sampled at its middle, the last one at s = 1. So a target with the same bones as
+  the source takes its exact pose, and the turns along any target add up to the source's total.
+- The basis follows the polyline's mean direction, which equals the first bone's on a straight limb.
+  A first bone is often a stub across the body (pelvis to hip) or a short piece of an extracted
+  curve. The mean direction is the one matched on the screen and does not depend on the sampling.
 
-Turns come from positions, so the twist of a bone about itself is not seen: each bone takes the
-smallest rotation from where its predecessor has carried it.
+Rotations come from positions, so the twist of a bone about itself is unknown: each bone takes the
+smallest rotation from the direction to which its predecessor has carried it.
 """
 
 from __future__ import annotations
@@ -33,17 +33,17 @@ from solvers.kernels.quaternion import between, conjugate, multiply, normalized,
 
 Array = NDArray[np.float64]
 
-# A direction within 15 degrees of the camera's up axis leaves the sign of y to noise.
+# Within 15 degrees of the camera's up axis, noise would decide the sign of y.
 _UPRIGHT: Final = math.sin(math.radians(15.0))
-# As an arm swings through the opposite of its rest direction the smallest rotation whips around;
-# there (cosine under the first figure) the last frame decides, above the second the rest alone.
+# Near the opposite of the rest direction the smallest rotation changes abruptly. Below the first
+# cosine the last frame decides the rotation, above the second only the rest direction.
 _OPPOSED, _FREE = -0.9, -0.5
-# A joint may be turned on past 180 degrees, up to this, before the short way round takes over.
+# A joint may turn on beyond 180 degrees, up to this angle, before it takes the short way round.
 _LONGEST_TURN: Final = math.cos(math.radians(270.0) / 2.0)
 
 
 def mean_direction(points: Array) -> Array:
-    """Unit vector (3,) from a polyline's start to the mean of its length; +Z if it has none."""
+    """Return the unit vector (3,) from a polyline's start to its centre; +Z without length."""
     bones = np.diff(points, axis=0)
     lengths = np.linalg.norm(bones, axis=1)
     total = float(lengths.sum())
@@ -59,7 +59,7 @@ def mean_direction(points: Array) -> Array:
 
 
 def view_basis(direction: Array, view: Array) -> Array:
-    """Right-handed basis of a polyline as a matrix of columns x, y, z.
+    """Return the right-handed basis of a polyline, a matrix of columns x, y, z.
 
     z is the unit `direction`; y is perpendicular to it and to the viewing direction and points up.
     Where the polyline points along the viewing direction, y is as near to up as it can be.
@@ -83,17 +83,17 @@ def view_basis(direction: Array, view: Array) -> Array:
 def basis_change(
     source: Array, target: Array, source_view: Array, target_view: Array, *, flip: bool = False
 ) -> Array:
-    """Rotation (3, 3) that takes the source polyline's world to the target polyline's.
+    """Return the rotation (3, 3) from the source polyline's world to the target polyline's.
 
     Args:
         source: (3,) unit direction of the source polyline.
         target: (3,) unit direction of the target polyline.
         source_view: (3, 3) rotation from the source's world to its capture device.
         target_view: (3, 3) rotation from the target's world to its camera.
-        flip: turn the target's y-axis over, as the performer may wish.
+        flip: reverse the target's y-axis, an option of the performer.
 
-    Source: AniMesh, sections 5.1 and 5.2. Where a limb hangs upright on the screen, "up" does not
-    tell which way its y-axis points; then both limbs turn in the same sense on the screen.
+    Source: AniMesh, sections 5.1 and 5.2. Where a limb is upright on the screen, "up" does not
+    determine the sign of its y-axis; then both limbs turn in the same sense on the screen.
     """
     source_basis = view_basis(source, source_view)
     target_basis = view_basis(target, target_view)
@@ -107,11 +107,11 @@ def basis_change(
 
 
 def bone_samples(source_rest: Array, target_rest: Array) -> tuple[NDArray[np.int64], Array]:
-    """Where each target bone samples q: between which two source bones, and at which share.
+    """Return where each target bone samples q: between two source bones, at a share.
 
     Returns:
         (Q - 1, 2) the source bones on either side; (Q - 1,) the share of the way to the second.
-        Source bones without length turn nothing.
+        Source bones without length have no effect.
     """
     lengths = np.linalg.norm(np.diff(source_rest, axis=0), axis=1)
     real = np.flatnonzero(lengths > 1e-9 * lengths.sum())
@@ -127,13 +127,13 @@ def bone_samples(source_rest: Array, target_rest: Array) -> tuple[NDArray[np.int
 
 
 class ChainMap(NamedTuple):
-    """How the motion of a source polyline is carried over to a target: what no frame changes.
+    """The constants of the transfer from a source polyline to a target polyline.
 
     Attributes:
         rest: (P - 1, 3) unit directions of the source's bones; zero for a bone without length.
-        axis: (3,) what a bone turns about that has come to point the other way.
+        axis: (3,) the rotation axis of a bone that points opposite to its rest direction.
         bones: (Q - 1, 2) as of `bone_samples`.
-        shares: (Q - 1,) likewise.
+        shares: (Q - 1,) as of `bone_samples`.
         change: (3, 3) rotation from the source's world to the target's.
     """
 
@@ -151,14 +151,14 @@ def map_chain(
     target_view: ArrayLike,
     flip: bool = False,
 ) -> ChainMap:
-    """How the motion of one polyline is carried over to another.
+    """Prepare the transfer of motion from one polyline to another.
 
     Args:
         source_rest: (P, 3) source nodes at rest, from the root outward, P >= 2.
         target_rest: (Q, 3) target nodes at rest, from the root outward, Q >= 2.
         source_view: (3, 3) rotation from the source's world to its capture device.
         target_view: (3, 3) rotation from the target's world to its camera.
-        flip: turn the target's y-axis over (section 5.2).
+        flip: reverse the target's y-axis (section 5.2).
 
     Raises:
         ValueError: a wrong shape.
@@ -205,14 +205,14 @@ def _middles(points: Array) -> Array:
 
 @kernel
 def follow_bones(rest: Array, pose: Array, axis: Array, turns: Array, last: Array) -> None:
-    """Update each bone's turn against its predecessor, and its direction as that one carries it.
+    """Update each bone's rotation against its predecessor, and its direction in that one's frame.
 
     Args:
         rest: (P - 1, 3) as of `ChainMap`.
-        pose: (P, 3) where the source's nodes are now.
+        pose: (P, 3) positions of the source's nodes.
         axis: (3,) as of `ChainMap`.
-        turns: (P - 1, 4) as of the last frame, zero before the first; overwritten.
-        last: (P - 1, 3) each bone's direction, carried back; overwritten.
+        turns: (P - 1, 4) rotations of the last frame, zero before the first; overwritten.
+        last: (P - 1, 3) each bone's direction, with its predecessor's rotation undone; overwritten.
     """
     carried = (0.0, 0.0, 0.0, 1.0)
     for i in range(len(rest)):
@@ -242,10 +242,11 @@ def _continue(
     d: tuple[float, float, float],
     c: tuple[float, float, float],
 ) -> tuple[float, float, float, float]:
-    """Between the smallest turn from rest and the last frame's turn moved on without twist.
+    """Blend the smallest rotation from rest with the last frame's, moved on without twist.
 
-    Both take the rest direction d to c and so differ by a twist about d. Where d and c oppose, the
-    former has a pole, and the latter is kept; elsewhere no history can add up to a drift.
+    Both take the rest direction d to c, so they differ by a twist about d. Where d and c oppose,
+    the smallest rotation has a pole, and the last frame's is kept. Elsewhere the result does not
+    depend on earlier frames, so nothing drifts.
     """
     cosine = d[0] * c[0] + d[1] * c[1] + d[2] * c[2]
     t = min(max((_FREE - cosine) / (_FREE - _OPPOSED), 0.0), 1.0)
@@ -262,7 +263,7 @@ def _continue(
 def _same_side(
     turn: tuple[float, float, float, float], last: tuple[float, float, float, float]
 ) -> tuple[float, float, float, float]:
-    """`turn` with the sign that continues `last`, unless that leads far round the long way."""
+    """`turn` with the sign nearer to `last`, unless the rotation would then be too long."""
     near = turn[0] * last[0] + turn[1] * last[1] + turn[2] * last[2] + turn[3] * last[3]
     sign = -1.0 if near < 0.0 else 1.0
     if sign * turn[3] < _LONGEST_TURN:
@@ -274,7 +275,7 @@ def _same_side(
 def sample_bones(
     turns: Array, bones: NDArray[np.int64], shares: Array, change: Array, sampled: Array
 ) -> None:
-    """Put q at each target bone, taken over into the target's world, into `sampled` (Q - 1, 4)."""
+    """Write q at each target bone, in the target's world, to `sampled` (Q - 1, 4)."""
     carried = (0.0, 0.0, 0.0, 1.0)
     at = -1
     for j in range(len(bones)):
@@ -284,7 +285,7 @@ def sample_bones(
             turn = (turns[at, 0], turns[at, 1], turns[at, 2], turns[at, 3])
             carried = normalized(multiply(carried, turn))
         q = carried
-        if after > before:  # those in between have no length and turn nothing
+        if after > before:  # bones in between have no length and no effect
             turn = (turns[after, 0], turns[after, 1], turns[after, 2], turns[after, 3])
             q = multiply(carried, power(turn, shares[j]))
         for k in range(3):

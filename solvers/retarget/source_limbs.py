@@ -1,4 +1,4 @@
-"""A performer's skeleton simplified to its limbs, once, for matching in every frame.
+"""Simplifies a performer's skeleton to its limbs, for matching in every frame.
 
 Source: AniMesh (Jin et al. 2015), section 4.1 and figure 3b.
 """
@@ -16,23 +16,22 @@ from solvers.skeleton.tree import Tree
 
 Array = NDArray[np.float64]
 
-# Of a performer; two hands have ten. The longest are kept.
+# The most limbs of a performer, the longest first; two hands have ten.
 MOST_LIMBS: Final = 20
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SimplifiedSource:
-    """A performer's skeleton after one step of simplification (figure 3b), ready for every frame.
+    """A performer's skeleton after one step of simplification (figure 3b).
 
     Attributes:
         tree: the performer's joints.
-        chains: joint ids of each of the m branches, from the fork it hangs on to a leaf.
+        chains: joint ids of each of the m branches, from its fork to a leaf.
         weights: (m, J); a branch's abstracted position is its row times the joints' positions.
-        forks: joint ids of the branch nodes that were kept, the one nearest to the tree's root
-            first.
-        centre: the joint that branches are seen from, chosen as in `SubTree`.
+        forks: joint ids of the kept branch nodes, the nearest to the tree's root first.
+        centre: the joint that is the branches' origin, chosen as in `abstraction.SubTree`.
         stem: joint ids from the tree's root down to the first fork; () where that is the root.
-        length: longest branch at rest, from `centre` to its abstracted position.
+        length: the longest branch at rest, from `centre` to its abstracted position.
     """
 
     tree: Tree
@@ -44,7 +43,7 @@ class SimplifiedSource:
     length: float
 
     def branch_vectors(self, positions: Array) -> Array:
-        """Abstracted branches (m, 3) of a pose (J, 3), seen from the centre."""
+        """Return the abstracted branches (m, 3) of a pose (J, 3), measured from the centre."""
         vectors: Array = self.weights @ positions - positions[self.centre]
         return vectors
 
@@ -52,9 +51,9 @@ class SimplifiedSource:
 def simplify(tree: Tree) -> SimplifiedSource:
     """Simplify a performer's skeleton to its limbs: AniMesh, section 4.1 and figure 3b.
 
-    Leaf chains collapse in a single step, as in the paper. Where a skeleton has more than limbs,
-    what is small against the whole belongs to the limb that carries it: hands with fingers on a
-    body, a face, twist joints. A hand alone keeps its fingers.
+    Leaf chains collapse in a single step, as in the paper. A part that is small against the whole
+    belongs to the limb at which it is attached: hands with fingers on a body, a face, twist joints.
+    A hand alone keeps its fingers.
     """
     folding = Folding(tree, np.eye(len(tree)))
     shortest = SPUR * tree.heights[tree.root]

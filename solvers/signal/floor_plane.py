@@ -1,7 +1,7 @@
-"""The floor under somebody's feet, as a plane fitted to where they stood.
+"""Fits the plane of the floor to the places where a performer's feet have stood.
 
-Least squares with forgetting: only six sums are kept. A small penalty on the slope keeps the floor
-level as long as the feet have stood at one place only, where any slope would fit.
+Least squares with forgetting keeps only six sums. A small penalty on the slope keeps the floor
+level while the feet have stood at one place only, where any slope would fit.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from solvers.kernels.compiled import kernel
 Array = NDArray[np.float64]
 
 MEMORY = 10.0  # [s] after which a step counts half
-STIFFNESS = 0.5  # [s m^2] of standing a metre away that tilts as much as the level floor holds
-STEEPEST = 0.6  # slope, about 30 degrees; what is steeper was no floor
+STIFFNESS = 0.5  # [s m^2] of standing a metre away that balances the pull to a level floor
+STEEPEST = 0.6  # slope, about 30 degrees; a steeper plane is no floor
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,10 +31,10 @@ class FloorState:
 
 
 class FloorFit:
-    """A plane y = a x + b z + c through points that come one by one.
+    """A plane y = a x + b z + c through points that arrive over time.
 
     Attributes:
-        weight: [s] of standing that is remembered.
+        weight: [s] of standing in the sums.
     """
 
     def __init__(self) -> None:
@@ -43,7 +43,7 @@ class FloorFit:
         self.weight = 0.0
 
     def add(self, points: Array, dt: float) -> None:
-        """Take in where feet stood (n, 3) [m] for `dt` [s]."""
+        """Add places (n, 3) [m] where feet stood for `dt` [s]."""
         keep = 0.5 ** (dt / MEMORY)
         _add(self._normal, self._right, points, keep, dt)
         self.weight = keep * self.weight + dt * len(points)
@@ -57,7 +57,7 @@ class FloorFit:
         self._normal[:], self._right[:], self.weight = state.normal, state.right, state.weight
 
     def plane(self) -> tuple[float, float, float]:
-        """The slopes along x and z and the height [m] at the origin; level at 0 before any step."""
+        """Return the slopes along x and z and the height [m] at the origin; zeros at first."""
         if self.weight <= 0.0:
             return 0.0, 0.0, 0.0
         (xx, xz, x), (_, zz, z), _ = self._normal.tolist()

@@ -1,7 +1,6 @@
-"""Percentiles of very many positive numbers, in memory that does not grow.
+"""Percentiles of very many positive numbers, from a histogram of fixed size.
 
-A histogram of bins of one width, from 0 up; its last bin holds all that lies beyond, and what is
-not a number.
+All bins have one width, from 0 up. The last bin also counts larger numbers and NaN.
 """
 
 from __future__ import annotations
@@ -25,9 +24,9 @@ def count(values: Array, width: float, counts: Counts) -> None:
 
 
 def percentile(counts: Counts, width: float, percent: float) -> Array:
-    """Where the bin (...) begins that so many percent of the numbers counted (..., B) reach.
+    """Return the start (...) of the bin that contains a percentile of the counts (..., B).
 
-    It is 0 where none were counted.
+    It is 0 where the counts are empty.
     """
     reached = np.cumsum(counts, axis=-1)
     below: Array = width * (reached < 0.01 * percent * reached[..., -1:]).sum(axis=-1)

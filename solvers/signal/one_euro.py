@@ -1,9 +1,10 @@
-"""The One-Euro filter: a low-pass whose cutoff rises with speed; rest is calm, motion prompt.
+"""The One-Euro filter: a low-pass filter of points whose cutoff rises with speed.
+
+Points at rest are smoothed strongly, and fast points follow with little delay.
 
 Source: Casiez, Roussel, Vogel 2012, "1€ Filter: A Simple Speed-based Low-pass Filter for Noisy
-Input in Interactive Systems", algorithm 1. One thing differs: the cutoff of a point follows the
-length of its velocity, not each coordinate by itself, so that the answer does not depend on how the
-axes lie.
+Input in Interactive Systems", algorithm 1. One difference: the cutoff of a point follows the length
+of its velocity, not each coordinate, so the result does not depend on the axes.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from solvers.kernels.compiled import kernel
 Array = NDArray[np.float64]
 
 MIN_CUTOFF = 2.0
-"""[Hz] at rest: noise of 30 Hz is reduced to about half, a point that starts has a lag of 80 ms."""
+"""[Hz] at rest: 30 Hz noise is reduced to about half; a point that starts has a lag of 80 ms."""
 
 SPEED_COEFFICIENT = 12.0
 """[Hz s/m] the paper's beta: at 1 m/s the cutoff is 14 Hz and the lag 11 ms."""
@@ -28,7 +29,7 @@ DERIVATIVE_CUTOFF = 3.0
 
 
 NO_TIME = 1e-6
-"""[s] and less between two samples tell no velocity."""
+"""[s]: so short a time between two samples gives no velocity."""
 
 # Of each point: the newest sample, the smoothed one, the smoothed velocity.
 _POINT = np.dtype([(name, np.float64, 3) for name in ("raw", "smooth", "velocity")])
@@ -36,7 +37,7 @@ _POINT = np.dtype([(name, np.float64, 3) for name in ("raw", "smooth", "velocity
 
 @kernel
 def smoothing_factor(cutoff: float, dt: float) -> float:
-    """The weight of the newest sample in exponential smoothing.
+    """Return the weight of the newest sample in exponential smoothing.
 
     Args:
         cutoff: [Hz] above 0.
@@ -53,16 +54,15 @@ class OneEuroState:
 
 
 class OneEuroFilter:
-    """Smooths points that come one sample at a time.
+    """Smooths points, one sample at a time.
 
-    A constant input comes out unchanged, to the last bit. Of a point that moves evenly with speed v
-    the output lags 1 / (2 pi (min_cutoff + speed_coefficient v)) seconds behind.
+    A constant input stays unchanged, to the last bit. For a point of constant speed v the output
+    lags by 1 / (2 pi (min_cutoff + speed_coefficient v)) seconds.
 
     Args:
         min_cutoff: [Hz] the cutoff at rest.
-        speed_coefficient: [Hz s/m] by how much the cutoff rises with speed.
-        derivative_cutoff: [Hz] of the velocity that is used for that.
-
+        speed_coefficient: [Hz s/m] the rise of the cutoff with speed.
+        derivative_cutoff: [Hz] the cutoff of the velocity from which the speed is taken.
     """
 
     def __init__(
@@ -78,11 +78,11 @@ class OneEuroFilter:
 
     @property
     def velocity(self) -> Array | None:
-        """(n, 3) [m/s] the smoothed velocity; None before the first sample."""
+        """The smoothed velocity (n, 3) [m/s]; None before the first sample."""
         return None if self._points is None else self._points["velocity"]
 
     def reset(self) -> None:
-        """Forget every sample; the next one comes out as it is."""
+        """Forget all samples; the next one stays unchanged."""
         self._points = None
 
     def snapshot(self) -> OneEuroState:
@@ -94,14 +94,14 @@ class OneEuroFilter:
         self._points = None if state.points is None else state.points.copy()
 
     def filter(self, points: Array, dt: float) -> Array:
-        """Points (n, 3) [m], smoothed.
+        """Return the smoothed points (n, 3) [m].
 
         Args:
             points: (n, 3) [m], finite; n may not change between samples.
-            dt: [s] since the sample before; a sample that took no time changes nothing.
+            dt: [s] since the last sample; at 0 the sample has no effect.
 
         Raises:
-            ValueError: there are not as many points as before.
+            ValueError: the number of points has changed.
         """
         if self._points is None:
             self._points = np.zeros(len(points), _POINT)

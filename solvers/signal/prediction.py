@@ -1,4 +1,4 @@
-"""Where points will be a moment later: their velocity, smoothed, goes on and is damped."""
+"""Predicts points one sample ahead from their smoothed and damped velocity."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from solvers.signal.one_euro import NO_TIME, smoothing_factor
 Array = NDArray[np.float64]
 
 VELOCITY_CUTOFF = 6.0  # [Hz]
-GOES_ON = 0.7  # share of the velocity that is expected to go on
-MOST = 1.0 / 30.0  # [s] ahead
+GOES_ON = 0.7  # share of the velocity that is expected to continue
+MOST = 1.0 / 30.0  # [s] the farthest prediction
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -24,7 +24,7 @@ class PredictorState:
     Attributes:
         before: (n, 3) [m] the last sample, None before any.
         velocity: (n, 3) [m/s] smoothed, None before any sample.
-        step: [s] by which the last answer lay ahead.
+        step: [s] how far ahead the last prediction was.
     """
 
     before: Array | None
@@ -35,7 +35,7 @@ class PredictorState:
 class Predictor:
     """Predicts points one step ahead.
 
-    A point at rest stays where it is, to the last bit.
+    A point at rest stays in place, to the last bit.
     """
 
     def __init__(self) -> None:
@@ -57,14 +57,14 @@ class Predictor:
         self._step = state.step
 
     def predict(self, points: Array, dt: float) -> Array:
-        """Points (n, 3) [m] as they will be one step later.
+        """Return the points (n, 3) [m] as predicted for one sample later.
 
         Args:
             points: (n, 3) [m], finite.
-            dt: [s] since the sample before, which the next is expected to take too.
+            dt: [s] since the last sample; the next is expected after the same time.
 
         Raises:
-            ValueError: there are not as many points as before.
+            ValueError: the number of points has changed.
         """
         if self._before is None or self._velocity is None:
             self._before, self._velocity = points.copy(), np.zeros_like(points)
@@ -84,7 +84,7 @@ def _copied(points: Array | None) -> Array | None:
 
 @kernel
 def _follow(points: Array, before: Array, velocity: Array, dt: float) -> None:
-    """Smooth the velocity (n, 3) of points (n, 3) that were `before`."""
+    """Update the smoothed velocity (n, 3) of points (n, 3) from their places `before`."""
     weight = smoothing_factor(VELOCITY_CUTOFF, dt)
     for i in range(len(points)):
         for axis in range(3):

@@ -1,7 +1,7 @@
-"""Damped springs: what is pulled to a target overshoots a little and comes to rest there.
+"""Damped springs: numbers that follow their targets with a small overshoot.
 
-The motion of each is the exact solution for a target that stands still during a step, so that any
-step is stable and two short steps are one long one.
+Each step is the exact solution for a target that is constant during the step. So steps of any
+length are stable, and two short steps equal one long step.
 """
 
 from __future__ import annotations
@@ -26,16 +26,16 @@ class SpringsState:
 
 
 class Springs:
-    """A number of like springs, at rest where they begin.
+    """Equal springs, at rest at the start.
 
     Args:
-        start: (n,) where they are.
-        frequency: of the undamped spring [1/s].
-        damping: share of the critical, in (0, 1).
+        start: (n,) initial positions.
+        frequency: [1/s] of the undamped spring.
+        damping: share of the critical damping, in (0, 1).
 
     Attributes:
-        at: (n,) where they are now.
-        speed: (n,) [1/s].
+        at: (n,) current positions.
+        speed: (n,) [1/s] current speeds.
     """
 
     def __init__(self, start: ArrayLike, *, frequency: float, damping: float) -> None:
@@ -53,9 +53,9 @@ class Springs:
         self.at[:], self.speed[:] = state.at, state.speed
 
     def step(self, target: ArrayLike, seconds: float) -> Array:
-        """Where they are (n,) after `seconds` [s] of being pulled to `target` (n,).
+        """Return the positions (n,) after `seconds` [s] of pull to `target` (n,).
 
-        The next step overwrites it.
+        The next step overwrites the array.
         """
         goal = np.ascontiguousarray(target, dtype=np.float64)
         decay = self._damping * self._omega

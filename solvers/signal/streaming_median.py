@@ -1,4 +1,4 @@
-"""The median of positive numbers of any size, in memory that does not grow."""
+"""The median of very many positive numbers, from a logarithmic histogram of fixed size."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ _LOWEST, _DECADES, _BINS_A_DECADE = -12, 18, 50
 class StreamingMedian:
     """Counts numbers in bins that are each 4.7 % wide, from 1e-12 to 1e6.
 
-    What is smaller counts as 0, what is larger or not a number as 1e6.
+    A smaller number counts as 0, a larger one or NaN as 1e6.
     """
 
     def __init__(self) -> None:
@@ -29,7 +29,7 @@ class StreamingMedian:
 
     @property
     def median(self) -> float:
-        """The middle number, to within half a bin; 0 before the first."""
+        """The median, to within half a bin; 0 before the first number."""
         counts = np.cumsum(self._counts)
         place = int(np.searchsorted(counts, 0.5 * counts[-1]))
         if place == 0:

@@ -1,9 +1,9 @@
-"""How a skeleton holds the surface around it: anchors along the bones, each with a ring of handles.
+"""Binds a surface to a skeleton by anchors on the bones, each with a ring of handles.
 
-An anchor is a point of a bone that takes a ring of surface vertices along with the bone's rigid
-motion. Anchors stand at least a limb's radius apart, so that the surface between two of them is
-free to bend as a limb does; none stands inside the body that a limb grows from, so that a turning
-limb does not wring the body; the tip of every limb has one, so that it follows to the end.
+An anchor is a point of a bone; its ring of surface vertices follows the bone's rigid motion.
+Anchors are about a limb's radius apart, so that the surface between two anchors can bend. No anchor
+lies inside the trunk, so that a turning limb does not twist the trunk. The tip of every limb has an
+anchor, so that the limb follows to its end.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from solvers.skeleton.limbs import bones_in_trunk, closest_bones, limbs
 
 RING = 10  # handles of one anchor: enough to fix its turn and its cross-section
 SPACING = 0.9  # least distance between anchors of a limb, in radii of that limb
-TUBE = 1.2  # length of limb that one anchor on a long bone keeps straight, in radii
+TUBE = 1.2  # length of a long bone for each of its anchors, in radii
 SMALL = 0.25  # a loose component under this share of the whole is carried rigidly
 
 Array = NDArray[np.float64]
@@ -29,16 +29,16 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SkeletonBinding:
-    """What holds a surface: handles in groups, each group an anchor on the skeleton.
+    """The handles that bind a surface to a skeleton, in groups, one group for each anchor.
 
     Attributes:
         handles: (H,) int vertex indices, each once.
-        anchor: (H,) int into the A anchors, which one holds each handle.
-        node: (A,) int; the node at the far end of the anchor's bone, or the branch node itself.
-        pivot: (A,) int; the node about which the anchor turns: the bone's near end, or the
-            branch node itself.
+        anchor: (H,) int, the anchor of each handle, 0 to A - 1.
+        node: (A,) int; the node at the far end of the anchor's bone, or the fork itself.
+        pivot: (A,) int; the node about which the anchor turns: the bone's near end, or the fork
+            itself.
         inside: (K,) bool; whether the bone that ends at each node lies inside the trunk.
-        owner: (N,) int; the anchor that each vertex is nearest to along its own limb.
+        owner: (N,) int; the nearest anchor to each vertex along its own limb.
     """
 
     handles: Indices
@@ -52,7 +52,7 @@ class SkeletonBinding:
 @dataclass(frozen=True, slots=True, eq=False)
 class _Anchor:
     point: Array  # (3,)
-    tangent: Array  # (3,) unit, or zero at a branching
+    tangent: Array  # (3,) unit, or zero at a fork
     node: int
     pivot: int
 
@@ -79,7 +79,7 @@ def _limb_anchors(
 
 
 def _with_tip(anchors: list[_Anchor], limb: list[int], positions: Array, radius: float) -> None:
-    """Let a limb's tip be held, in place of a last anchor that stands too near."""
+    """Append an anchor at the limb's tip; it replaces a last anchor that is too near."""
     tip, pivot = limb[-1], limb[-2]
     bone = positions[tip] - positions[pivot]
     length = float(np.linalg.norm(bone))
@@ -141,7 +141,7 @@ def _ring(offsets: Array, tangent: Array) -> Indices:
 
 
 def _one_rings(count: int, faces: Indices) -> csr_array:
-    """(N, N): each row has entries at those vertices that share a triangle with its own."""
+    """(N, N): each row has entries at the vertices that share a triangle with its vertex."""
     tails, heads = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
     rows, columns = np.append(tails, heads), np.append(heads, tails)
     return csr_array((np.ones(len(rows)), (rows, columns)), shape=(count, count))
@@ -164,18 +164,18 @@ def bind(
     positions: Array,
     bone_of_vertex: Indices | None = None,
 ) -> SkeletonBinding:
-    """Choose the handles by which a skeleton holds a surface.
+    """Choose the handles that bind a surface to a skeleton.
 
-    Every component of the surface gets handles: one that no ring reaches is carried rigidly by
-    the anchor nearest to it, or held in several places when it is large.
+    Every component of the surface gets handles. A small component without a ring follows the
+    nearest anchor rigidly; a large one follows several anchors.
 
     Args:
         vertices: (N, 3) [m] rest positions.
         faces: (F, 3) triangles.
         parents: (K,) parent of each node, -1 at the root.
         positions: (K, 3) [m] rest positions of the nodes.
-        bone_of_vertex: (N,) the node at the far end of the bone that each vertex belongs to, as
-            a rig's weights say; the nearest bone when None.
+        bone_of_vertex: (N,) the node at the far end of each vertex's bone, by the weights of a
+            rig; the nearest bone when None.
     """
     nearest, distance = closest_bones(vertices, parents, positions)
     if bone_of_vertex is not None:
@@ -187,12 +187,12 @@ def bind(
     handles: list[int] = []
     groups: list[int] = []
     one_rings = _one_rings(len(vertices), faces)
-    beside = np.zeros(len(vertices), dtype=np.bool_)  # those that share a triangle with a handle
+    beside = np.zeros(len(vertices), dtype=np.bool_)  # vertices that share a triangle with a handle
     for index, anchor in enumerate(anchors):
         own = np.flatnonzero(owner == index)
         if len(own) == 0:
             continue
-        # Two rings that touch would fold what is between them as soon as they turn differently.
+        # Two rings that touch would fold the triangles between them when they turn differently.
         candidates = own[~beside[own]]
         if len(candidates) < RING:
             candidates = own
@@ -228,7 +228,7 @@ def _owners(
     limb_of_vertex = limb_of_node[nearest]
     owner = np.zeros(len(vertices), dtype=np.int64)
     least = np.full(len(vertices), np.inf)
-    # One anchor after the other: a matrix of all gaps would not fit a large character.
+    # One anchor after the other: a matrix of all distances would be too large.
     for index, (anchor, point) in enumerate(zip(anchors, points, strict=True)):
         offset = vertices - point
         gap = np.einsum("ij,ij->i", offset, offset)
@@ -244,7 +244,7 @@ def _owners(
 def _hold_loose_components(
     vertices: Array, one_rings: csr_array, owner: Indices, handles: list[int], groups: list[int]
 ) -> None:
-    """Append handles for each component of the surface that too few hold to fix its turn."""
+    """Append handles for each component that has too few handles to fix its rotation."""
     number, label = connected_components(one_rings, directed=False)
     if number == 1:
         return

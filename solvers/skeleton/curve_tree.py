@@ -22,12 +22,12 @@ from solvers.skeleton.space_graph import (
 
 MOST_NODES = 200
 
-_SPUR = 1.8  # a limb is at least so many times as long as its largest radius, to its tip
-_PROBES = 8  # bones along which that radius is looked for
-_CONE = 0.5  # cosine of the angle in which a tip lies ahead of a leaf
-_TIP = 0.9  # the share of what surrounds a leaf that lies before its tip
-_STUB = 3.0  # a loop whose ends are no more radii of their fork long is no hole
-_CROWDED = 1.0  # forks closer than so many radii are one
+_SPUR = 1.8  # the least length of a limb to its tip, in its largest radii
+_PROBES = 8  # bones along which that radius is measured
+_CONE = 0.5  # cosine of the half angle ahead of a leaf in which its tip lies
+_TIP = 0.9  # the share of the surface around a leaf that lies before its tip
+_STUB = 3.0  # ends of an opened loop up to so many radii of their fork are cut back
+_CROWDED = 1.0  # forks nearer than so many radii are merged
 _BONES = 60
 _LIMB_BONES = (3, 12)
 
@@ -35,10 +35,10 @@ Chain = list[int]
 
 
 def without_loops(positions: FloatArray, edges: IntArray, outside: cKDTree) -> SpaceGraph:
-    """One tree over all nodes; a loop is opened at its longest edge.
+    """Return one tree over all nodes, with every loop opened at its longest edge.
 
-    Around a real hole that leaves two limbs. A small loop is one of separators inside a thick
-    part, and the ends that are left of it are cut back to where they fork.
+    An opened loop around a real hole leaves two limbs. A small loop comes from separators inside a
+    thick part; the ends that it leaves are cut back to their forks.
     """
     edges = np.vstack([edges, bridges(positions, component_labels(len(positions), edges))])
     lengths = np.linalg.norm(positions[edges[:, 0]] - positions[edges[:, 1]], axis=1) + 1e-9
@@ -57,7 +57,7 @@ def without_loops(positions: FloatArray, edges: IntArray, outside: cKDTree) -> S
 
 
 def with_tips(tree: SpaceGraph, surface: SpaceGraph) -> SpaceGraph:
-    """With every leaf led on to the tip of its limb, on the surface around it."""
+    """Move every leaf to the tip of its limb on the surface around it."""
     neighbours = tree.neighbours()
     owner = cKDTree(tree.positions).query(surface.positions)[1]
     own = owner[surface.edges[:, 0]] == owner[surface.edges[:, 1]]
@@ -81,9 +81,9 @@ def with_tips(tree: SpaceGraph, surface: SpaceGraph) -> SpaceGraph:
 def without_spurs(
     tree: SpaceGraph, surface: SpaceGraph, outside: cKDTree, shortest: float
 ) -> SpaceGraph:
-    """Without spurs: limbs that, led on to their tips, are hardly longer than thick.
+    """Remove spurs: limbs that, extended to their tips, are hardly longer than thick.
 
-    All spurs of a fork go at once, so that a head does not end in the longer one of its ears.
+    All spurs of a fork are removed at once, so that a head does not end in its longer ear.
     """
     while True:
         whole = with_tips(tree, surface)
@@ -98,7 +98,7 @@ def without_spurs(
 
 
 def with_merged_forks(tree: SpaceGraph, outside: cKDTree) -> SpaceGraph:
-    """With forks that lie within one another's thickness made into one, as where arms meet."""
+    """Merge forks that lie within one another's radius, as where two arms meet."""
     while True:
         neighbours = tree.neighbours()
         radii = outside.query(tree.positions)[0]
@@ -122,7 +122,7 @@ def _contracted(tree: SpaceGraph, chain: Chain) -> SpaceGraph:
 
 
 def smoothed(tree: SpaceGraph) -> SpaceGraph:
-    """With the zigzag of single separators taken out of chains; forks and tips stay."""
+    """Smooth the zigzag of single separators in chains; forks and tips stay in place."""
     neighbours = tree.neighbours()
     positions = tree.positions.copy()
     inner = [node for node, near in enumerate(neighbours) if len(near) == 2]
@@ -135,7 +135,7 @@ def smoothed(tree: SpaceGraph) -> SpaceGraph:
 
 
 def resampled(tree: SpaceGraph) -> SpaceGraph:
-    """With bones of similar length: 3 to 12 from a fork to a tip, 1 to 12 between two forks."""
+    """Resample to bones of similar length: 3 to 12 from fork to tip, 1 to 12 between forks."""
     neighbours = tree.neighbours()
     chains = _chains(neighbours)
     forks = tree.ends()
@@ -159,13 +159,13 @@ def resampled(tree: SpaceGraph) -> SpaceGraph:
 
 
 def _tip_chains(neighbours: list[list[int]]) -> list[Chain]:
-    """The chains that lead from a fork to a tip, in this direction."""
+    """The chains from a fork to a tip, in this direction."""
     both = [run for chain in _chains(neighbours) for run in (chain, chain[::-1])]
     return [run for run in both if len(neighbours[run[0]]) > 2 and len(neighbours[run[-1]]) == 1]
 
 
 def _chains(neighbours: list[list[int]]) -> list[Chain]:
-    """Maximal runs of nodes between forks and tips, each once; both ends are in the run."""
+    """All chains of nodes between forks and tips, each once, with both ends."""
     chains = []
     for start, around in enumerate(neighbours):
         if len(around) == 2:

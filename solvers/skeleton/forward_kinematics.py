@@ -1,11 +1,11 @@
-"""Forward kinematics of a character's skeleton whose chains are driven by bone rotations.
+"""Places a character's skeleton from the rotations of its driven bones (forward kinematics).
 
-Source: AniMesh (Jin et al. 2015), section 5.2 and figure 5: what hangs on a driven chain rides
-rigidly with it.
+Source: AniMesh (Jin et al. 2015), section 5.2 and figure 5: nodes attached to a driven chain follow
+it rigidly.
 
-Rotations are world rotations from rest, so a limb that hangs on a driven spine starts from where
-the spine has moved to, but points where the performer's limb points: the source was measured in the
-world as well, and nothing is turned twice.
+Rotations are world rotations from rest. A limb on a driven spine starts at the end of the moved
+spine, but its direction is that of the performer's limb: the source is measured in the world as
+well, so no rotation is applied twice.
 """
 
 from __future__ import annotations
@@ -27,12 +27,12 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Placed:
-    """Where the K nodes of a tree are, and how they and its bones are turned.
+    """Positions and rotations of the K nodes of a tree, and rotations of its bones.
 
     Attributes:
         positions: (K, 3).
-        turns: (2 K, 4) world rotations from rest: of each node, then of the bone that ends at each;
-            none ends at the root.
+        turns: (2 K, 4) world rotations from rest, of each node, then of the bone that ends at each
+            node; no bone ends at the root.
     """
 
     positions: Array
@@ -45,15 +45,16 @@ class Placed:
 
 
 class SkeletonPose:
-    """Moves the nodes of a tree with its driven chains; assembled once, posed every frame.
+    """Moves the nodes of a tree with its driven chains, in every frame.
 
     Args:
         tree: K nodes at rest.
-        root: the node that stays where it is; every chain leads away from it.
-        chains: node ids of the driven chains. They share no bone; where one ends another may start.
+        root: the node that stays in place; every chain leads away from it.
+        chains: node ids of the driven chains. They share no bone; a chain may start where another
+            ends.
 
     Raises:
-        ValueError: a chain that does not follow bones away from the root, or a bone driven twice.
+        ValueError: a chain does not follow bones away from the root, or a bone is driven twice.
     """
 
     def __init__(self, tree: Tree, root: int, chains: Sequence[Sequence[int]]) -> None:
@@ -77,7 +78,7 @@ class SkeletonPose:
         self._bones = row
 
     def pose(self, bone_rotations: Sequence[Array]) -> tuple[Array, Array]:
-        """Rotations (K, 4) and positions (K, 3) of all nodes, as of `place`.
+        """Return rotations (K, 4) and positions (K, 3) of all nodes, as of `place`.
 
         Args:
             bone_rotations: for each chain, world rotations from rest (len(chain) - 1, 4).
@@ -86,18 +87,18 @@ class SkeletonPose:
         return placed.rotations, placed.positions
 
     def place(self, bone_rotations: Array) -> Placed:
-        """Place all nodes as the B bones of the chains are turned.
+        """Place all nodes for rotations of the B bones of the chains.
 
         A point x of the surface that follows node k goes to R_k (x - rest_k) + position_k. Inside a
-        chain a node turns with the bone that starts at it, as a rig's joint does, and what hangs
-        there rides along; at the chain's end with its last bone; where a chain starts the node
-        keeps what moves it otherwise. All other nodes ride with their parent.
+        chain a node has the rotation of the bone that starts at it, like a joint of a rig, and so
+        do the nodes attached there. At a chain's end a node has the rotation of the last bone. A
+        node where a chain starts, and all other nodes, follow their parents.
 
         Args:
             bone_rotations: (B, 4) world rotations from rest, chain after chain.
 
         Raises:
-            ValueError: not one rotation for each driven bone.
+            ValueError: the number of rotations differs from that of driven bones.
         """
         if bone_rotations.shape != (self._bones, 4):
             raise ValueError(
@@ -112,7 +113,7 @@ class SkeletonPose:
         return placed
 
     def stretched(self, positions: Array, shares: Array) -> Array:
-        """Where nodes at (K, 3) are when the bone that ends at each is `shares` (K,) as long."""
+        """Return nodes at (K, 3), moved so that the bone that ends at each is `shares` as long."""
         out = np.empty_like(positions)
         _stretch(self._links, positions, shares, out)
         return out
@@ -121,7 +122,7 @@ class SkeletonPose:
 def pose(
     tree: Tree, root: int, chains: Sequence[Sequence[int]], bone_rotations: Sequence[Array]
 ) -> tuple[Array, Array]:
-    """Rotations (K, 4) and positions (K, 3) of all nodes; see `SkeletonPose`."""
+    """Return rotations (K, 4) and positions (K, 3) of all nodes; see `SkeletonPose`."""
     return SkeletonPose(tree, root, chains).pose(bone_rotations)
 
 
@@ -135,7 +136,7 @@ def _forward(  # noqa: PLR0917
     turns: Array,
     positions: Array,
 ) -> None:
-    """Place every node after its parent; `turns` as of `Placed`."""
+    """Place each node after its parent; `turns` as of `Placed`."""
     rotations, bones = turns[: len(rest)], turns[len(rest) :]
     for step in range(len(links)):
         node, parent = links[step, 0], links[step, 1]
@@ -167,7 +168,7 @@ def _forward(  # noqa: PLR0917
 
 @kernel
 def _stretch(links: Ints, positions: Array, shares: Array, out: Array) -> None:
-    """Move every node along with its parent, and out along its bone."""
+    """Move each node with its parent, and along its bone by the bone's change of length."""
     for step in range(len(links)):
         node, parent = links[step, 0], links[step, 1]
         for k in range(3):

@@ -1,8 +1,8 @@
-"""Where limbs leave the body: which bones lie in a limb of their own and which inside the trunk.
+"""Finds which bones of a limb lie inside the trunk, and where the limb leaves it.
 
-A curve skeleton's limb begins at the fork in the middle of the body, so its first bones lie inside
-the trunk; so do a rig's collar bones and hips. An arm turns about its shoulder, not about the
-middle of the chest, and the trunk is not wrung by the arm's bones inside it.
+A limb of a curve skeleton begins at the fork in the middle of the body, so its first bones lie
+inside the trunk; so do the collar bones and hips of a rig. An arm must turn about its shoulder, not
+about the middle of the chest, and its bones inside the trunk must not twist the trunk.
 """
 
 from __future__ import annotations
@@ -10,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-SAMPLES = 6000  # points of the surface that are looked at
+SAMPLES = 6000  # points of the surface that are tested
 SECTORS = 8  # around a bone
-SURROUNDED = 6  # sectors in which a limb's bone sees surface
-THICK = 1.6  # times the limb's own radius: the trunk
-KEPT = 0.45  # share of a limb that is never counted as trunk
+SURROUNDED = 6  # the least sectors with surface around a bone of a limb
+THICK = 1.6  # of the limb's own radius: a bone farther from the surface lies inside the trunk
+KEPT = 0.45  # share of a limb that never counts as trunk
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -49,7 +49,7 @@ def closest_bones(points: Array, parents: Indices, positions: Array) -> tuple[In
 
 
 def limbs(parents: Indices) -> list[list[int]]:
-    """Chains of nodes between forks, root and leaves, each from its root side outward."""
+    """Return the chains of nodes between forks, root and leaves, each from the root outward."""
     children = np.bincount(parents[parents >= 0], minlength=len(parents))
     found = []
     for node in range(len(parents)):
@@ -68,18 +68,18 @@ def limbs(parents: Indices) -> list[list[int]]:
 def bones_in_trunk(
     vertices: Array, faces: Indices, parents: Indices, positions: Array
 ) -> NDArray[np.bool_]:
-    """For each node whether the bone that ends there lies inside the trunk, (K,).
+    """Return for each node whether the bone that ends there lies inside the trunk, (K,).
 
-    Only the beginning of a limb can: at most the share of it that `KEPT` leaves. A bone lies inside
-    the trunk when surface is missing on some side of it, or is much farther away than around the
-    outer part of the same limb.
+    Only the beginning of a limb can lie inside, at most 1 - `KEPT` of its length. A bone lies
+    inside the trunk if the surface is missing on some sides of it, or is much farther away than
+    around the outer part of the same limb.
     """
     points = surface_points(vertices, faces)
     nearest, distance = closest_bones(points, parents, positions)
     inside = np.zeros(len(parents), dtype=bool)
     for limb in limbs(parents):
         lengths = np.linalg.norm(np.diff(positions[limb], axis=0), axis=1)
-        if not lengths.any():  # nodes on one spot lead nowhere
+        if not lengths.any():  # all nodes at one place
             continue
         along = np.cumsum(lengths) / lengths.sum()
         outer = np.isin(nearest, [n for n, at in zip(limb[1:], along, strict=True) if at > 0.5])
@@ -97,7 +97,7 @@ def bones_in_trunk(
 
 
 def surface_points(vertices: Array, faces: Indices) -> Array:
-    """About `SAMPLES` points spread evenly over the surface, the same ones every time."""
+    """Return about `SAMPLES` points spread evenly over the surface, always the same ones."""
     corners = vertices[faces]
     area = np.linalg.norm(
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
@@ -114,7 +114,7 @@ def surface_points(vertices: Array, faces: Indices) -> Array:
 
 
 def _sectors(offsets: Array, bone: Array) -> int:
-    """In how many of the sectors around a bone some of these points (n, 3) lie."""
+    """The number of sectors around a bone that contain some of the points (n, 3)."""
     length = float(np.linalg.norm(bone))
     if len(offsets) == 0 or length <= 0.0:
         return 0

@@ -17,8 +17,14 @@ from solvers.skeleton.space_graph import FloatArray, IntArray, SpaceGraph
 
 
 def local_separators(surface: SpaceGraph) -> tuple[FloatArray, IntArray]:
-    """Nodes and edges that PyGEL3D finds, from every vertex: its sampling draws from the system's
-    random device and gives another skeleton at each call."""
+    """Return nodes (n, 3) and edges (e, 2) of the curve graph that PyGEL3D finds.
+
+    Every vertex is a start: PyGEL3D's sampling uses the system's random device and would give
+    another graph at each call.
+
+    Raises:
+        ImportError: PyGEL3D is not installed.
+    """
     try:
         from pygel3d import graph  # noqa: PLC0415  # an optional extra
     except ImportError as error:
@@ -41,10 +47,10 @@ def local_separators(surface: SpaceGraph) -> tuple[FloatArray, IntArray]:
 
 @contextmanager
 def _quiet_stdout() -> Iterator[None]:
-    """Send what C++ prints to descriptor 1 nowhere: PyGEL3D reports its progress there."""
+    """Suppress output of C++ to descriptor 1, where PyGEL3D prints its progress."""
     try:
         kept = os.dup(1)
-    except OSError:  # a service without standard output: nothing to keep quiet
+    except OSError:  # a service without standard output
         yield
         return
     nowhere = os.open(os.devnull, os.O_WRONLY)

@@ -1,12 +1,13 @@
-"""The curve skeleton of any surface: local separators of its edge graph, made into a clean tree.
+"""Extracts a skeleton from any surface: a tree of nodes along the middle of its limbs.
 
-A local separator is a small set of vertices whose removal cuts a piece of the surface in two, as a
-ring around an arm does; each becomes a node. Broken surfaces are closed and dense ones reduced
-first; the result is opened at its loops, led on to the tips of the limbs, pruned of spurs, merged
-at crowded forks, smoothed and evenly resampled, so that every limb is one chain of similar bones.
+The nodes come from local separators of the surface's edge graph. A local separator is a small set
+of vertices whose removal cuts a piece of the surface in two, such as a ring around an arm. Broken
+surfaces are closed and dense ones reduced first. The resulting graph is opened at its loops,
+extended to the tips of the limbs, pruned of spurs, merged at crowded forks, smoothed and evenly
+resampled, so that every limb is one chain of similar bones.
 
 Source: Bærentzen and Rotenberg 2021, "Skeletonization via Local Separators", ACM TOG 40(5), as
-implemented by PyGEL3D; the tree that is made of its graph is our own.
+implemented by PyGEL3D. The steps from its graph to a tree are our own.
 """
 
 from __future__ import annotations
@@ -43,23 +44,23 @@ VERSION = 4
 """Part of a cache's key: raise it whenever the same surface gives another skeleton."""
 
 # Lengths are shares of the longest side of the surface's box.
-_MOST_ENDS = 66  # so that every limb gets its bones within MOST_NODES
-_FEWEST = 24  # with fewer vertices there are no rings around limbs
-_FLAT = 1e-3  # a surface thinner than this is a sheet
+_MOST_ENDS = 66  # so that MOST_NODES suffice for the bones of every limb
+_FEWEST = 24  # fewer vertices form no rings around limbs
+_FLAT = 1e-3  # a thinner surface is a sheet
 _SPACING = 1 / 64  # of the samples on the border of a sheet
 _SHORTEST = 0.04  # the least length of a limb
 _STRAIGHT_BONES = 4
 
 
 def extract_skeleton(vertices: FloatArray, faces: IntArray) -> tuple[IntArray, FloatArray]:
-    """A tree of nodes inside the surface: parents (K,), -1 for the root, and positions (K, 3).
+    """Return a tree of nodes inside the surface: parents (K,), -1 for the root, positions (K, 3).
 
-    Works for closed, open, flat, broken and non-manifold surfaces and for several components; the
-    same arrays always give the same tree, of 2 to `MOST_NODES` nodes. Every parent comes before
-    its children.
+    The surface may be closed, open, flat, broken or non-manifold, and may have several components.
+    The same arrays always give the same tree, of 2 to `curve_tree.MOST_NODES` nodes. Every parent
+    comes before its children.
 
     Args:
-        vertices: (N, 3), any unit and frame; vertices that no face uses do not count.
+        vertices: (N, 3), any unit and frame; vertices without a face have no effect.
         faces: (F, 3) into `vertices`.
 
     Raises:
@@ -84,7 +85,7 @@ def extract_skeleton(vertices: FloatArray, faces: IntArray) -> tuple[IntArray, F
 
 
 def _limbs(points: FloatArray, triangles: IntArray) -> SpaceGraph | None:
-    """The clean tree of a surface, or None where there is nothing like a limb in it."""
+    """The clean tree of a surface, or None for a surface without limbs."""
     if len(points) < _FEWEST:
         return None
     border = border_edges(triangles)
@@ -119,7 +120,7 @@ def _axes(points: FloatArray) -> FloatArray:
 
 
 def _principal_axis(points: FloatArray) -> SpaceGraph:
-    """A straight chain along the longest axis of a lump that has no limbs, within its box."""
+    """A straight chain along the longest axis of a surface without limbs, within its box."""
     axis = _axes(points)[0]
     axis = axis * np.sign(axis[np.argmax(np.abs(axis))])
     middle = points.mean(axis=0)
@@ -133,14 +134,14 @@ def _principal_axis(points: FloatArray) -> SpaceGraph:
 
 
 def _rooted(tree: SpaceGraph) -> tuple[IntArray, FloatArray]:
-    """Parents and positions from the root of AniMesh's hierarchy, every parent first."""
+    """Parents and positions from the root of AniMesh's hierarchy, parents before children."""
     parents, positions = _ordered(tree, 0)
     root = find_root(Tree(parents, positions))[0]
     return _ordered(tree, int(np.flatnonzero((tree.positions == positions[root]).all(axis=1))[0]))
 
 
 def _ordered(tree: SpaceGraph, root: int) -> tuple[IntArray, FloatArray]:
-    """Parents and positions of the nodes in the order that a walk from `root` meets them."""
+    """Parents and positions of the nodes in breadth-first order from `root`."""
     count = len(tree.positions)
     links = edge_matrix(count, tree.edges, np.ones(len(tree.edges)))
     order, before = breadth_first_order(links, root, directed=False)

@@ -43,7 +43,7 @@ class SpaceGraph:
 
 
 def welded(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
-    """The surface with one vertex where there were several, without faces that have no area."""
+    """Merge vertices at the same place, and drop faces that use a vertex twice."""
     _, first, group = np.unique(
         np.round(points / _SAME), axis=0, return_index=True, return_inverse=True
     )
@@ -53,7 +53,7 @@ def welded(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArra
 
 
 def unpinched(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
-    """The surface with one vertex a fan of faces: knees that touch in a point are two knees."""
+    """Split vertices at which several fans of faces meet, so that touching knees are apart."""
     corners = np.arange(triangles.size).reshape(-1, 3)
     pairs = corners[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     ends = triangles.reshape(-1)[pairs]
@@ -68,14 +68,14 @@ def unpinched(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntA
 
 
 def border_edges(triangles: IntArray) -> IntArray:
-    """The edges (b, 2) that do not lie between exactly two faces."""
+    """Return the edges (b, 2) that do not lie between exactly two faces."""
     sides = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
     edges, faces = np.unique(sides, axis=0, return_counts=True)
     return np.asarray(edges[faces != 2], dtype=np.int64)
 
 
 def has_inside(points: FloatArray, triangles: IntArray, border: IntArray) -> bool:
-    """Whether the surface is one piece but for details, with few or small openings."""
+    """Whether the surface is one piece, apart from details, with few or small openings."""
     open_length = np.linalg.norm(points[border[:, 0]] - points[border[:, 1]], axis=1).sum()
     corners = points[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
@@ -87,7 +87,7 @@ def has_inside(points: FloatArray, triangles: IntArray, border: IntArray) -> boo
 
 
 def reduced(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArray]:
-    """The surface with about `_GRAPH_VERTICES` vertices."""
+    """Reduce the surface to about `_GRAPH_VERTICES` vertices."""
     if len(points) <= _GRAPH_VERTICES:
         return points, triangles
     try:
@@ -106,7 +106,7 @@ def reduced(points: FloatArray, triangles: IntArray) -> tuple[FloatArray, IntArr
 
 
 def surface_graph(points: FloatArray, triangles: IntArray) -> SpaceGraph:
-    """The surface's edges; pieces that do not touch are tied together where they come closest."""
+    """Return the graph of the surface's edges, with separate pieces joined by bridges."""
     edges = unique_edges(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2))
     labels = component_labels(len(points), edges)
     kept = _significant(points, labels)
@@ -135,7 +135,7 @@ def edge_matrix(count: int, edges: IntArray, values: FloatArray) -> csr_array:
 
 
 def _significant(points: FloatArray, labels: IntArray) -> IntArray:
-    """Vertices of the pieces that carry the shape: not of eyes, buttons and stray triangles."""
+    """Vertices of the pieces that form the shape: no eyes, buttons or stray triangles."""
     count = int(labels.max()) + 1
     low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
     np.minimum.at(low, labels, points)
@@ -147,7 +147,7 @@ def _significant(points: FloatArray, labels: IntArray) -> IntArray:
 
 
 def bridges(points: FloatArray, labels: IntArray) -> IntArray:
-    """Edges that join all pieces into one by the shortest gaps, as a minimum spanning tree."""
+    """Return edges across the shortest gaps that join all pieces (a minimum spanning tree)."""
     pieces = [np.flatnonzero(labels == label) for label in np.unique(labels)]
     trees = [cKDTree(points[piece]) for piece in pieces]
     gaps = np.zeros((len(pieces), len(pieces)))

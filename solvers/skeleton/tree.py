@@ -1,4 +1,4 @@
-"""A skeleton as a tree of nodes in space: what is matched and what is moved."""
+"""A skeleton as a tree of nodes in space, for matching and for posing."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 
 def children_of(parents: NDArray[np.int64]) -> tuple[tuple[int, ...], ...]:
-    """The children of each node, in ascending order, from `parents` (K,), -1 for a root."""
+    """Return the children of each node, ascending, from `parents` (K,), -1 for a root."""
     children: list[list[int]] = [[] for _ in parents]
     for node, parent in enumerate(parents.tolist()):
         if parent >= 0:
@@ -20,7 +20,7 @@ def children_of(parents: NDArray[np.int64]) -> tuple[tuple[int, ...], ...]:
 
 
 def parents_first(parents: NDArray[np.int64]) -> tuple[int, ...]:
-    """The nodes of a tree with every parent before its children.
+    """Return the nodes of a tree with every parent before its children.
 
     Args:
         parents: (K,) index of each node's parent, -1 for the one root.
@@ -44,7 +44,7 @@ def parents_first(parents: NDArray[np.int64]) -> tuple[int, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Tree:
-    """Nodes joined by bones; rooted by `parents`, yet every query works on the unrooted tree too.
+    """Nodes joined by bones; `parents` define the root, but queries also serve the unrooted tree.
 
     Attributes:
         parents: (K,) int; index of each node's parent, -1 for the one root. Any order.
@@ -109,7 +109,7 @@ class Tree:
 
     @cached_property
     def degree(self) -> NDArray[np.int64]:
-        """(K,) how many neighbours: 1 at a leaf, 2 on a chain, more at a branch (section 4.1)."""
+        """(K,) number of neighbours: 1 at a leaf, 2 on a chain, more at a fork (section 4.1)."""
         return np.array([len(around) for around in self.neighbours], dtype=np.int64)
 
     @cached_property
@@ -146,7 +146,7 @@ class Tree:
         return centre
 
     def chain(self, start: int, end: int) -> tuple[int, ...]:
-        """The nodes on the path from `start` to `end`, both included."""
+        """Return the nodes on the path from `start` to `end`, both included."""
         up = [start]
         while self.parents[up[-1]] >= 0:
             up.append(int(self.parents[up[-1]]))
@@ -157,12 +157,12 @@ class Tree:
         return (*up[: above[down[-1]]], *reversed(down))
 
     def length(self, chain: Sequence[int]) -> float:
-        """Length of the polyline through the nodes of `chain`."""
+        """Return the length of the polyline through the nodes of `chain`."""
         points = self.positions[list(chain)]
         return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
 
     def subtree(self, node: int, away_from: int | None = None) -> tuple[int, ...]:
-        """`node` and all that hangs on it, seen from its neighbour `away_from` (its parent)."""
+        """Return `node` and all nodes beyond it, seen from `away_from` (by default its parent)."""
         blocked = int(self.parents[node]) if away_from is None else away_from
         found = [(node, blocked)]
         for here, before in found:
@@ -170,7 +170,7 @@ class Tree:
         return tuple(here for here, _ in found)
 
     def rerooted(self, root: int) -> Tree:
-        """The same nodes and bones with `root` as the root."""
+        """Return the same nodes and bones with `root` as the root."""
         if root == self.root:
             return self
         parents = self.parents.copy()
@@ -181,7 +181,7 @@ class Tree:
 
 
 def extend_to_leaf(tree: Tree, chain: ArrayLike) -> tuple[int, ...]:
-    """Lengthen a chain of at least two nodes along the longest path that leads on, to a leaf.
+    """Extend a chain of at least two nodes along the longest path to a leaf.
 
     Source: AniMesh (Jin et al. 2015), section 5.2 and figure 5, right.
     """

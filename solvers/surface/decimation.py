@@ -1,14 +1,14 @@
-"""A coarser surface made of a dense one's own vertices, of the same topology, evenly spread.
+"""Reduces a dense surface to fewer of its own vertices, with the same topology, evenly spread.
 
-Half-edge collapses, shortest first: a vertex is merged into a neighbour, which stays where it is,
-so that what holds a coarse vertex holds that very vertex of the dense surface. An edge counts as
-longer the farther the collapse would take the surface from where it was (Garland and Heckbert 1997,
-Surface simplification using quadric error metrics, section 4), so that fingers keep their shape
-and flat parts still get even triangles, which deform well where long slivers do not.
+The edges collapse in the order of their lengths. A vertex is merged into a neighbour, which stays
+in place, so a handle at a coarse vertex is a handle at the same vertex of the dense surface. An
+edge counts as longer the more its collapse would move the surface (Garland and Heckbert 1997,
+Surface simplification using quadric error metrics, section 4). So fingers keep their shape, and
+flat parts still get even triangles, which deform better than long slivers.
 
-Nothing is ever joined that was apart, and no piece vanishes: a collapse must pass the link
-condition (Dey et al. 1999, Topology preserving edge contraction), may not turn a face over, may not
-pinch an opening, and never takes a piece's last face.
+Separate parts stay separate, and no component vanishes. A collapse must pass the link condition
+(Dey et al. 1999, Topology preserving edge contraction), may not turn a face over, may not close an
+opening, and may not remove a component's last face.
 """
 
 from __future__ import annotations
@@ -23,14 +23,14 @@ from numpy.typing import NDArray
 
 from solvers.kernels.compiled import kernel, parallel_kernel
 
-DEVIATION = 8.0  # how much longer an edge counts for each length that the surface moves away
-_GROWTH = 1.3  # of the longest cost collapsed in a round, when a round has found too few
+DEVIATION = 8.0  # factor of the surface's deviation in the cost of a collapse
+_GROWTH = 1.3  # of the largest cost in a round, after a round with too few collapses
 _TOO_FEW = 0.02  # of the vertices
 _COARSEST = 1.0  # squared, in diagonals: no edge is longer
-_STEEPEST = 0.5  # cosine of the most that a face may turn in one collapse
-_SLIVER = 0.06  # area over sum of squared edges, 0.144 at best; thinner may not get thinner
+_STEEPEST = 0.5  # cosine of the largest turn of a face in one collapse
+_SLIVER = 0.06  # area over sum of squared edges, 0.144 at best; a thinner face may not get thinner
 
-_SMOOTH, _BORDER, _LOCKED = 0, 1, 2  # kinds of vertices: may go, only along the border, not at all
+_SMOOTH, _BORDER, _LOCKED = 0, 1, 2  # vertices that may merge: freely, along the border, never
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -42,10 +42,10 @@ class Decimation:
     """A coarse surface within a dense one.
 
     Attributes:
-        kept: (C,) the dense surface's vertices that stayed, ascending; coarse vertex c is kept[c].
+        kept: (C,) the kept vertices of the dense surface, ascending; coarse vertex c is kept[c].
         faces: (F', 3) the coarse faces, into the C coarse vertices.
-        cluster: (N,) the coarse vertex that each dense vertex was merged into along edges; -1 for a
-            vertex that no proper face uses.
+        cluster: (N,) the coarse vertex into which each dense vertex was merged along edges; -1 for
+            a vertex without a proper face.
     """
 
     kept: Ints
@@ -54,11 +54,11 @@ class Decimation:
 
 
 class _Mesh(NamedTuple):
-    """A triangle mesh whose vertices know their faces: corner e of vertex v, then following[e].
+    """A triangle mesh with a list of corners for each vertex: first[v], then following[e].
 
     `quadrics` (N, 11) hold each vertex's squared distance to planes, weighted by area, as the upper
-    triangle of a 4x4 matrix by rows, and the area. `into` (N,) is what a vertex was merged into,
-    itself while it is there. `mark` (N,) is for a collapse's own use.
+    triangle of a 4x4 matrix by rows, and the area. `into` (N,) is the vertex into which a vertex
+    was merged, itself at first. `mark` (N,) is scratch space of a collapse.
     """
 
     points: Floats
@@ -74,14 +74,14 @@ class _Mesh(NamedTuple):
 
 
 def decimate(vertices: Floats, faces: Ints, count: int) -> Decimation:
-    """Merge vertices until `count` are left, or as near to that as topology lets it come.
+    """Merge vertices until `count` are left, or until the topology allows no more.
 
     The same arrays always give the same surface.
 
     Args:
         vertices: (N, 3) finite, any unit.
         faces: (F, 3); may have boundaries, several components, degenerate and non-manifold ones.
-        count: how many vertices to keep.
+        count: the number of vertices to keep.
     """
     mesh = _prepare(vertices, faces)
     left = len(np.unique(mesh.faces))
@@ -124,7 +124,7 @@ def _prepare(vertices: Floats, faces: Ints) -> _Mesh:
 
 
 def _edge_uses(count: int, faces: Ints) -> tuple[Ints, Ints, Ints]:
-    """Every edge (E, 2), in how many faces it is (E,), and one of its half-edges (E,)."""
+    """Every edge (E, 2), the number of its faces (E,), and one of its half-edges (E,)."""
     sides = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     keys, half, uses = np.unique(
         sides[:, 0] * count + sides[:, 1], return_index=True, return_counts=True
@@ -133,7 +133,7 @@ def _edge_uses(count: int, faces: Ints) -> tuple[Ints, Ints, Ints]:
 
 
 def _kinds(count: int, faces: Ints) -> Ints:
-    """Whether a vertex is inside the surface, on its border, or on an edge of more than two."""
+    """Whether a vertex is inside the surface, on its border, or on an edge of 3 faces or more."""
     edges, uses, _ = _edge_uses(count, faces)
     kind = np.full(count, _SMOOTH)
     kind[edges[uses == 1]] = _BORDER
@@ -142,7 +142,7 @@ def _kinds(count: int, faces: Ints) -> Ints:
 
 
 def _hold_borders(mesh: _Mesh) -> None:
-    """Keep border edges where they are by planes that stand on them; Garland and Heckbert, 6."""
+    """Keep border edges in place by planes through them; Garland and Heckbert, section 6."""
     edges, uses, half = _edge_uses(len(mesh.points), mesh.faces)
     edges, half = edges[uses == 1], half[uses == 1]
     tail, head = (mesh.points[edges[:, end]] for end in range(2))
@@ -162,7 +162,7 @@ def _hold_borders(mesh: _Mesh) -> None:
 
 
 def _compact(mesh: _Mesh) -> Decimation:
-    """Number what is left, and follow every vertex to where it went."""
+    """Number the kept vertices, and find the kept vertex of every vertex."""
     root = mesh.into
     while not np.array_equal(root[root], root):
         root = root[root]
@@ -219,7 +219,7 @@ def _normal(points: Floats, a: int, b: int, c: int) -> tuple[float, float, float
 
 @kernel
 def _cost(mesh: _Mesh, a: int, b: int) -> float:
-    """What merging a into b costs: the edge's length and the surface's deviation, squared."""
+    """The cost of merging a into b: the edge's length and the surface's deviation, squared."""
     x, y, z = mesh.points[b, 0], mesh.points[b, 1], mesh.points[b, 2]
     d0, d1, d2 = mesh.points[a, 0] - x, mesh.points[a, 1] - y, mesh.points[a, 2] - z
     error = _distance2(mesh.quadrics[a], x, y, z) + _distance2(mesh.quadrics[b], x, y, z)
@@ -249,10 +249,9 @@ def _collapse_costs(mesh: _Mesh, pairs: Ints, out: Floats) -> None:
 def _collapse_short(
     mesh: _Mesh, pairs: Ints, limit: float, wanted: int, clock: int
 ) -> tuple[int, int]:
-    """Collapse edges (E, 2) in their order while they cost no more than the limit.
+    """Collapse edges (E, 2) in their order, up to the cost `limit` and the number `wanted`.
 
-    Gives how many were collapsed, of those `wanted` at most, and the clock that the marks of
-    neighbours are told by.
+    Returns the number of collapses, and the clock, whose values mark a collapse's neighbours.
     """
     done = 0
     for i in range(len(pairs)):
@@ -289,7 +288,7 @@ def _may_collapse(mesh: _Mesh, a: int, b: int, clock: int) -> bool:
 
 @kernel
 def _link_faces(mesh: _Mesh, a: int, b: int, clock: int) -> int:
-    """How many faces edge (a, b) has, or 0 where its collapse would change the topology."""
+    """The number of faces of edge (a, b), or 0 if its collapse would change the topology."""
     shared = common = others_of_a = others_of_b = 0
     e = mesh.first[b]
     while e >= 0:
@@ -308,14 +307,14 @@ def _link_faces(mesh: _Mesh, a: int, b: int, clock: int) -> int:
                 has_b = has_b or v == b
                 if v not in (a, b) and mesh.mark[v] >= clock:
                     near += 1
-                    if mesh.mark[v] == clock:  # counted once, though two faces have it
+                    if mesh.mark[v] == clock:  # count a vertex of two faces once
                         common += 1
                         mesh.mark[v] = clock + 1
             if has_b:
                 shared += 1
             else:
                 others_of_a += 1
-                if near == 2:  # would fall together with a face of b
+                if near == 2:  # would coincide with a face of b
                     return 0
         e = mesh.following[e]
     if shared > 2 or common != shared or others_of_a + others_of_b - shared == 0:
@@ -338,7 +337,7 @@ def _keeps_shape(mesh: _Mesh, a: int, b: int) -> bool:
             new_area = math.sqrt(m0 * m0 + m1 * m1 + m2 * m2)
             if n0 * m0 + n1 * m1 + n2 * m2 < _STEEPEST * area * new_area:
                 return False
-            # Compared without division: faces may have no extent at all.
+            # Compared without division: a face may have no extent.
             sliver = new_area < _SLIVER * new_squares
             if sliver and new_area * squares < area * new_squares:
                 return False
@@ -348,7 +347,7 @@ def _keeps_shape(mesh: _Mesh, a: int, b: int) -> bool:
 
 @kernel
 def _collapse(mesh: _Mesh, a: int, b: int) -> None:
-    """Merge a into b, which inherits its faces."""
+    """Merge a into b, which takes over a's faces."""
     e = mesh.first[a]
     while e >= 0:
         f = e // 3

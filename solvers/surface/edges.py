@@ -14,12 +14,12 @@ from solvers.kernels.compiled import kernel
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-SHORTEST = 1e-9  # of the mesh's extent; what is shorter has no length to compare with
+SHORTEST = 1e-9  # of the mesh's extent; the stretch of a shorter edge is undefined
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Edges:
-    """Every edge of a mesh that has a length at rest, once.
+    """All edges of a mesh with a length at rest, each once.
 
     Attributes:
         ends: (E, 2) their vertices, the lower index first, in order.
@@ -44,7 +44,7 @@ class Edges:
         return cls(ends[kept], lengths[kept])
 
     def stretch(self, points: Array) -> Array:
-        """Relative change |l / l0 - 1| of each edge (E,) once the vertices are at points (N, 3)."""
+        """Return the relative change |l / l0 - 1| of each edge (E,) for vertices (N, 3)."""
         out = _lengths(points, self.ends)
         out /= self.lengths
         out -= 1.0

@@ -1,15 +1,16 @@
-"""A dense surface that follows a coarse one, with its detail turning as the coarse surface turns.
+"""Moves a dense surface with a coarse one; its detail rotates with the coarse surface.
 
-Each dense vertex p lies near one point q = sum w_k v_k of a coarse triangle, its detail d = p - q
-away. When the coarse vertices v_k go to x_k and the surface around them turns by R_k, it goes to
+Each dense vertex p belongs to a point q = sum w_k v_k of a coarse triangle, with the detail
+d = p - q. When the coarse vertices v_k move to x_k and the surface around them rotates by R_k, the
+dense vertex moves to
 
     sum_k w_k (x_k + R_k ((q - v_k) / 2 + d)).
 
-That is the mean of the triangle's own answer, sum w_k (x_k + R_k d), and of what each corner alone
-would say, sum w_k (x_k + R_k (p - v_k)). Their errors cancel to second order, so that a bend is
-round and no facet shows (James 2020, Phong deformation: a better C0 interpolant for embedded
-deformation, section 3; there in tetrahedra). A rigid motion of the coarse surface is followed
-exactly, whatever the weights.
+This is the mean of the triangle's prediction, sum w_k (x_k + R_k d), and of the corners' separate
+predictions, sum w_k (x_k + R_k (p - v_k)). Their errors cancel to second order, so bends are round
+and show no facets (James 2020, Phong deformation: a better C0 interpolant for embedded deformation,
+section 3; there in tetrahedra). A rigid motion of the coarse surface is followed exactly, whatever
+the weights.
 """
 
 from __future__ import annotations
@@ -32,8 +33,8 @@ from solvers.surface.embedding_kernels import (
     follow_frames,
 )
 
-MOST_VERTICES = 1 << 16  # of a coarse surface, whose numbers are kept in two bytes
-_FLAT = 1e-6  # share of the second extent of a ring of edges that counts as a line
+MOST_VERTICES = 1 << 16  # of a coarse surface, whose indices have two bytes
+_FLAT = 1e-6  # least second extent of a ring of edges, as a share of the first; less is a line
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
@@ -42,10 +43,12 @@ Ints = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Embedding:
-    """Where dense vertices lie on a coarse surface; 26 bytes a vertex, as each tick reads them.
+    """The places of dense vertices on a coarse surface; compact, because every frame reads them.
+
+    A vertex takes 26 bytes.
 
     Attributes:
-        corners: (N, 3) the coarse vertices of each one's triangle.
+        corners: (N, 3) the coarse vertices of each dense vertex's triangle.
         weights: (N, 2) of the second and third corner; all three are in [0, 1] and sum to 1.
         details: (N, 3) from the place in the triangle to the dense vertex, at rest.
     """
@@ -56,15 +59,14 @@ class Embedding:
 
 
 def embed(points: Floats, cluster: Ints, vertices: Floats, faces: Ints) -> Embedding:
-    """Find each point's place on a surface near a vertex of it that is known to be its own.
+    """Find each point's place on a surface, starting at the point's own vertex of the surface.
 
-    The nearest triangle is looked for from `cluster` on, over neighbours and never across a gap: a
-    finger is bound to itself, however near the next one is.
+    The search for the nearest triangle goes from neighbour to neighbour, never across a gap: a
+    finger is bound to itself, however near the next finger is.
 
     Args:
         points: (N, 3).
-        cluster: (N,) the vertex that each point belongs to; a point of -1 has none, and moves
-            rigidly with the nearest vertex.
+        cluster: (N,) the vertex of each point; a point of -1 moves rigidly with the nearest vertex.
         vertices: (C, 3), at most `MOST_VERTICES`.
         faces: (F, 3).
 
@@ -90,7 +92,7 @@ def embed(points: Floats, cluster: Ints, vertices: Floats, faces: Ints) -> Embed
     bound = places.triangle >= 0
     corners[bound] = faces[places.triangle[bound]]
     corners[~bound] = _nearest(points[~bound], vertices)[:, None]
-    weights = places.weights[:, 1:].astype(np.float32)  # what is lost, the detail makes good
+    weights = places.weights[:, 1:].astype(np.float32)  # the detail corrects the rounding
     shares = np.column_stack([1.0 - weights.sum(axis=1, dtype=np.float64), weights])
     on_it = np.einsum("nk,nkj->nj", shares, vertices[corners])
     return Embedding(corners.astype(np.uint16), weights, (points - on_it).astype(np.float32))
@@ -103,12 +105,12 @@ def _nearest(points: Floats, vertices: Floats) -> Ints:
 
 
 class DenseSurface:
-    """Lets the N vertices of a dense surface follow the C vertices of a coarse one.
+    """Moves the N vertices of a dense surface with the C vertices of a coarse one.
 
-    Nothing is allocated after the constructor.
+    It has no memory between frames. Only the constructor allocates arrays.
 
     Args:
-        embedding: where they lie on it.
+        embedding: the places of the dense vertices on the coarse surface.
         vertices: (C, 3) the coarse surface at rest.
         faces: (F, 3) its triangles.
     """
@@ -119,7 +121,7 @@ class DenseSurface:
         self._frames = np.empty((len(vertices), FRAME))
 
     def follow(self, moved: Floats, out: Floats | Singles) -> None:
-        """Put the dense vertices into `out` (N, 3) that go with coarse vertices `moved` (C, 3).
+        """Write the dense vertices for coarse vertices `moved` (C, 3) to `out` (N, 3).
 
         Raises:
             ValueError: for arrays of another shape.
@@ -136,7 +138,7 @@ class DenseSurface:
 
     @property
     def bytes_moved(self) -> int:
-        """What one `follow` into float64 cannot but read and write."""
+        """The bytes that one `follow` into float64 must read and write."""
         held, rings = self.embedding, self._rings
         dense = held.corners.nbytes + held.weights.nbytes + held.details.nbytes
         coarse = sum(array.nbytes for array in rings) + rings.rest.nbytes + self._frames.nbytes
@@ -144,10 +146,10 @@ class DenseSurface:
 
 
 def _rings(rest: Floats, faces: Ints) -> Rings:
-    """Neighbours of each vertex, and edges to them weighted by cotangents.
+    """The neighbours of each vertex, and edges to them weighted by cotangents.
 
-    A vertex whose neighbours lie on one line, which would leave its turn
-    open, looks at their neighbours too.
+    If a vertex's neighbours lie on one line, its rotation would be ambiguous; then the neighbours'
+    neighbours are added.
     """
     count = len(rest)
     weighted = cotangent_edges(rest, faces)

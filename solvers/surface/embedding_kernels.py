@@ -1,6 +1,7 @@
-"""Compiled loops of `solvers.surface.embedding`: where a point lies on a surface; how it follows.
+"""Compiled kernels that bind points to a coarse surface and move them with it.
 
-Every kernel gives the same bits for any number of threads: each point is worked on by itself.
+They serve `solvers.surface.embedding`. Every kernel returns the same bits for any number of
+threads, because the points are independent.
 """
 
 from __future__ import annotations
@@ -15,8 +16,8 @@ from solvers.deform.rotation_fit import LANES, SCRATCH, fit_rotations
 from solvers.kernels.compiled import kernel, parallel_kernel
 
 _TINY = 1e-300
-_STEPS = 64  # from triangle to triangle; each brings the point nearer
-_BLOCK = 512  # points that one thread works on at a time
+_STEPS = 64  # from triangle to triangle, each nearer to the point
+_BLOCK = 512  # points in one thread's unit of work
 _R = 9 * LANES
 
 Floats = NDArray[np.float64]
@@ -24,16 +25,16 @@ Singles = NDArray[np.float32]
 Ints = NDArray[np.int64]
 Counts = NDArray[np.uint32]
 
-# Columns of a frame: rotation by rows, where its half-offset origin went, rest position.
+# Columns of a frame: rotation by rows, moved half-offset origin, rest position.
 FRAME = 16
 _MOVED = 9
 _REST = 12
 
 
 class Triangles(NamedTuple):
-    """A surface whose vertices (C, 3) know their faces (F, 3).
+    """A surface with vertices (C, 3), faces (F, 3), and the faces at each vertex.
 
-    Those of vertex v are incident[first[v] : first[v + 1]].
+    The faces at vertex v are incident[first[v] : first[v + 1]].
     """
 
     vertices: Floats
@@ -43,7 +44,7 @@ class Triangles(NamedTuple):
 
 
 class Places(NamedTuple):
-    """Points (N, 3), the triangle each lies in, coordinates (N, 3) there, and its squared gap."""
+    """Points (N, 3), their triangles, coordinates (N, 3) there, and squared distances to them."""
 
     points: Floats
     triangle: Ints
@@ -52,7 +53,7 @@ class Places(NamedTuple):
 
 
 class Rings(NamedTuple):
-    """Neighbours of vertices at rest (C, 3), as compressed rows; edges to them (M, 3), weighted."""
+    """The neighbours of vertices at rest (C, 3), as compressed rows, and weighted edges (M, 3)."""
 
     rest: Floats
     first: Counts
@@ -62,12 +63,12 @@ class Rings(NamedTuple):
 
 @parallel_kernel
 def bind_locally(surface: Triangles, start: Ints, places: Places) -> None:
-    """Find each point's nearest triangle, going from neighbour to neighbour while it gets nearer.
+    """Find each point's nearest triangle from neighbour to neighbour, while the distance falls.
 
     Args:
-        surface: what is searched.
-        start: (N,) the vertex to start at; a negative one leaves its point out.
-        places: points, and gaps infinite at first; the rest is filled in.
+        surface: the surface to search.
+        start: (N,) the vertex to start at; a negative one skips the point.
+        places: points, with infinite gaps at first; the other fields are written.
     """
     for i in prange(len(start)):
         if start[i] < 0:
@@ -83,7 +84,7 @@ def bind_locally(surface: Triangles, start: Ints, places: Places) -> None:
 
 @kernel
 def _search_around(surface: Triangles, vertex: int, places: Places, i: int) -> None:
-    """Place point i in one of a vertex's triangles if that is nearer than where it is."""
+    """Move point i to one of a vertex's triangles if that is nearer than its present one."""
     point, vertices = places.points[i], surface.vertices
     for slot in range(surface.first[vertex], surface.first[vertex + 1]):
         face = surface.incident[slot]
@@ -103,7 +104,7 @@ def _search_around(surface: Triangles, vertex: int, places: Places, i: int) -> N
 def _barycentric(  # noqa: PLR0911  one return for each region
     p: Floats, a: Floats, b: Floats, c: Floats
 ) -> tuple[float, float, float]:
-    """The coordinates of the point of triangle (a, b, c) that is nearest to p, by its regions.
+    """The barycentric coordinates of the point of triangle (a, b, c) nearest to p, by regions.
 
     Source: Ericson 2005, Real-time collision detection, section 5.1.5.
     """
@@ -135,7 +136,7 @@ def _barycentric(  # noqa: PLR0911  one return for each region
 
 @parallel_kernel
 def fit_frames(x: Floats, rings: Rings, frames: Floats) -> None:
-    """Fit how the surface around each of its vertices x (C, 3) has turned, into frames (C, FRAME).
+    """Fit the rotation of the surface around each vertex x (C, 3), into frames (C, FRAME).
 
     Source: Sorkine and Alexa 2007, eqs. (5) and (6).
     """
@@ -179,15 +180,15 @@ def follow_frames(
     details: Singles,
     out: Floats | Singles,
 ) -> None:
-    """Place N points by the frames (C, FRAME) of the triangles that they lie on.
+    """Move N points with the frames (C, FRAME) of their triangles' corners.
 
-    With rest positions v_k, q = sum w_k v_k and detail d = p - q, a point goes to
+    With rest positions v_k, q = sum w_k v_k and detail d = p - q, a point moves to
     sum w_k (x_k + R_k ((q - v_k) / 2 + d)).
 
     Args:
         frames: of the surface's vertices.
         corners: (N, 3) each point's triangle.
-        weights: (N, 2) of the second and third corner; the first has the rest.
+        weights: (N, 2) of the second and third corner; all three sum to 1.
         details: (N, 3) from the point's place in its triangle to the point itself.
         out: (N, 3), float32 or float64.
     """

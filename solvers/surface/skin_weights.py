@@ -1,4 +1,4 @@
-"""Skin weights that make a skinned skeleton follow a performed surface as closely as it can."""
+"""Fits skin weights, so that a skinned skeleton reproduces a performed surface."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from scipy.spatial.transform import Rotation
 
 from solvers.skeleton.tree import Tree
 
-INFLUENCES = 4  # nodes a vertex may follow, as game engines have it
-_CANDIDATES = 8  # nodes among which those are chosen
-_NEAR = 3  # steps along the tree within which nodes compete by distance alone
-_PRIOR = 2e-3  # of the character's size: smaller deviations do not outweigh the prior weights
+INFLUENCES = 4  # the most nodes for a vertex, as in game engines
+_CANDIDATES = 8  # nodes from which those are chosen
+_NEAR = 3  # steps along the tree within which only the distance counts
+_PRIOR = 2e-3  # of the character's size: for smaller deviations the prior weights count more
 _ITERATIONS = 200
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Skin:
-    """Which nodes each vertex follows, and how much.
+    """The nodes that each vertex follows, and their weights.
 
     Attributes:
         nodes: (N, C) int, distinct in each row where weights are not 0.
@@ -34,7 +34,7 @@ class Skin:
     weights: NDArray[np.float64]
 
     def strongest(self, count: int) -> Skin:
-        """The skin with no more than the `count` strongest nodes of each vertex."""
+        """Return the skin with at most the `count` strongest nodes of each vertex."""
         if self.nodes.shape[1] <= count:
             return self
         order = np.argsort(-self.weights, axis=1, kind="stable")[:, :count]
@@ -45,12 +45,12 @@ class Skin:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PosedSamples:
-    """Some frames of a performance, to fit a skin to.
+    """Frames of a performance to which a skin is fitted.
 
     Attributes:
-        vertices: (S, N, 3) [m] the surface, S may be 0.
+        vertices: (S, N, 3) [m] the surface; S may be 0.
         positions: (S, K, 3) [m] the nodes.
-        rotations: (S, K, 4) their rotations since rest, world.
+        rotations: (S, K, 4) the nodes' world rotations from rest.
     """
 
     vertices: NDArray[np.float64]
@@ -59,7 +59,7 @@ class PosedSamples:
 
 
 def skin_of_weights(weights: csr_array) -> Skin:
-    """The strongest four nodes of each row of weights (N, K); a row without any follows node 0."""
+    """Return the four strongest nodes of each row of weights (N, K); an empty row gives node 0."""
     entries = csr_array(weights).tocoo()
     values = np.maximum(entries.data, 0)
     order = np.lexsort((-values, entries.row))
@@ -75,10 +75,10 @@ def skin_of_weights(weights: csr_array) -> Skin:
 
 
 def skin_of_distances(vertices: NDArray[np.float64], tree: Tree) -> Skin:
-    """Weights that fall with the fourth power of the distance to the nodes.
+    """Return weights that fall with the fourth power of the distance to the nodes.
 
-    Only nodes near the nearest one along the tree compete, so that a limb does not follow another
-    that happens to hang beside it.
+    Nodes far from the nearest one along the tree are penalised, so that a limb does not follow
+    another limb that hangs beside it.
     """
     rest = tree.positions
     count = min(_CANDIDATES, len(rest))
@@ -98,19 +98,19 @@ def skin_of_distances(vertices: NDArray[np.float64], tree: Tree) -> Skin:
 
 
 def fit_skin(vertices: NDArray[np.float64], tree: Tree, prior: Skin, samples: PosedSamples) -> Skin:
-    """The skin with at most `INFLUENCES` nodes a vertex that reproduces the samples best.
+    """Return the skin with at most `INFLUENCES` nodes a vertex that reproduces the samples best.
 
     For each vertex, weights w >= 0 that sum to 1 minimise the squared distance between the
     skinned and the performed vertex over all samples, plus a small multiple of |w - prior|^2 that
-    decides where nodes move alike. First over all of the prior's nodes, then again over the
-    strongest of them. The weight step of Le & Deng 2012, "Smooth skinning decomposition with
+    decides where several nodes move alike. A first fit uses all of the prior's nodes, a second one
+    the strongest of them. The weight step of Le & Deng 2012, "Smooth skinning decomposition with
     rigid bones", section 4.2, here with given bones.
 
     Args:
         vertices: (N, 3) rest positions.
         tree: the nodes at rest.
-        prior: candidates, and weights to fall back on.
-        samples: what to reproduce.
+        prior: the candidates and their default weights.
+        samples: the frames to reproduce.
     """
     if len(samples.vertices) == 0:
         return prior.strongest(INFLUENCES)
@@ -125,7 +125,7 @@ def fit_skin(vertices: NDArray[np.float64], tree: Tree, prior: Skin, samples: Po
 def deviations(
     vertices: NDArray[np.float64], tree: Tree, skin: Skin, samples: PosedSamples
 ) -> NDArray[np.float64]:
-    """Distances (S, N) [m] between the skinned surface and the performed one."""
+    """Return the distances (S, N) [m] between the skinned and the performed surface."""
     found = np.zeros(samples.vertices.shape[:2])
     for sample in range(len(found)):
         offsets = _offsets(vertices, tree, skin, samples, sample)  # (N, C, 3)
@@ -134,7 +134,7 @@ def deviations(
 
 
 def _steps_between(tree: Tree) -> NDArray[np.float64]:
-    """How many bones lie between any two nodes (K, K)."""
+    """The number of bones between any two nodes (K, K)."""
     count = len(tree.parents)
     children = np.flatnonzero(tree.parents >= 0)
     ones = np.ones(len(children))
@@ -150,7 +150,7 @@ def _offsets(
     samples: PosedSamples,
     sample: int,
 ) -> NDArray[np.float64]:
-    """Where each of its nodes would take each vertex, from where it is: (N, C, 3)."""
+    """The offset from each performed vertex to its place as moved by each node: (N, C, 3)."""
     turns = Rotation.from_quat(samples.rotations[sample]).as_matrix()  # (K, 3, 3)
     shifts = samples.positions[sample] - np.einsum("kij,kj->ki", turns, tree.positions)
     carried = np.einsum("ncij,nj->nci", turns[skin.nodes], vertices) + shifts[skin.nodes]

@@ -1,9 +1,9 @@
-"""Which way up and which way round a surface stands, guessed from its shape alone.
+"""Estimates from its shape which side of a surface is up and whether it faces backwards.
 
 Three signs, as in Fu, Cohen-Or, Dror and Sheffer 2008, "Upright Orientation of Man-Made Objects",
-ACM TOG 27(3), section 4: what stands does not fall over, it is less alike above and below than
-before and behind, and a figure is tall. Only the two conventions of mesh files are told apart, +Y
-up and +Z up; weights were set by eye on figures, animals and vehicles.
+ACM TOG 27(3), section 4: a standing object is stable, it is less symmetric between above and below
+than between front and back, and a figure is tall. Only the two conventions of mesh files are
+distinguished, +Y up and +Z up. The weights were set by eye on figures, animals and vehicles.
 """
 
 from __future__ import annotations
@@ -19,16 +19,16 @@ FloatArray = NDArray[np.float64]
 SAMPLES = 8000
 X, Y, Z = range(3)
 
-_FLAT = 1e-3  # of the largest extent: thinner is a sheet
-_ROD = 0.15  # of the largest extent: what is thinner in both others lies as it lies
-_SOLE = 0.03  # of the height: what touches the ground
-_SURE = 0.25  # of the score: below it, +Y is up as in most files
-_TALL = 0.5  # of the logarithm of a ratio of extents: an animal's length is no height
+_FLAT = 1e-3  # of the largest extent: a thinner surface is a sheet
+_ROD = 0.15  # of the largest extent: a rod, thinner in both other extents, keeps +Y up
+_SOLE = 0.03  # of the height: the part that touches the ground
+_SURE = 0.25  # the least score for +Z; below it, +Y is up as in most files
+_TALL = 0.5  # of the logarithm of a ratio of extents: an animal may be longer than tall
 _TOES, _ANKLES = 0.05, (0.07, 0.14)  # of the height
 
 
 def surface_samples(vertices: FloatArray, faces: NDArray[np.int64]) -> FloatArray:
-    """`SAMPLES` points (n, 3) spread evenly over the faces (F, 3), always the same ones."""
+    """Return `SAMPLES` points (n, 3) spread evenly over the faces (F, 3), always the same ones."""
     corners = vertices[faces]
     edges = corners[:, 1:] - corners[:, :1]
     areas = np.linalg.norm(np.cross(edges[:, 0], edges[:, 1]), axis=1)
@@ -43,14 +43,14 @@ def surface_samples(vertices: FloatArray, faces: NDArray[np.int64]) -> FloatArra
 
 
 def flat_axis(points: FloatArray) -> int | None:
-    """The axis along which points (n, 3) have no extent, if they are a sheet along two axes."""
+    """Return the axis along which points (n, 3) have no extent, or None if they are no sheet."""
     extent = np.ptp(points, axis=0)
     thin = int(np.argmin(extent))
     return thin if extent[thin] <= _FLAT * extent.max() else None
 
 
 def stands_along_z(points: FloatArray) -> bool:
-    """Whether +Z, not +Y, is up for points (n, 3) spread over a surface; +Y where in doubt."""
+    """Return whether +Z, not +Y, is up for points (n, 3) on a surface; False in doubt."""
     extent = np.ptp(points, axis=0)
     if np.sort(extent)[1] < _ROD * extent.max():
         return False
@@ -63,7 +63,7 @@ def stands_along_z(points: FloatArray) -> bool:
 
 
 def faces_away(points: FloatArray) -> bool:
-    """Whether a tall figure, +Y up and alike left and right, has its toes at the back, -Z.
+    """Return whether a tall figure, +Y up and symmetric, has its toes at the back, -Z.
 
     Both the middle and the ends of the feet must lie behind the ankles.
     """
@@ -84,14 +84,14 @@ def faces_away(points: FloatArray) -> bool:
 
 
 def _asymmetry(points: FloatArray, axis: int) -> float:
-    """Mean distance from the mirror image, in the plane across `axis`, to the nearest point."""
+    """Mean distance from the mirror image, in the plane across `axis`, to the nearest points."""
     mirrored = points.copy()
     mirrored[:, axis] = 2.0 * points[:, axis].mean() - points[:, axis]
     return float(cKDTree(points).query(mirrored, workers=2)[0].mean())
 
 
 def _stability(points: FloatArray, axis: int) -> float:
-    """How far inside what touches the ground, seen along `axis`, the middle lies; -1: nowhere."""
+    """How far inside the contact area with the ground the centre lies, along `axis`; -1 if none."""
     height = points[:, axis] - points[:, axis].min()
     across = np.delete(points, axis, axis=1)
     sole = across[height <= _SOLE * height.max()]

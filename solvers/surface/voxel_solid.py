@@ -1,8 +1,8 @@
-"""The solid that a broken surface stands for: walled-in voxels, closed again.
+"""Turns a broken surface into a solid of voxels, and the solid into a closed surface.
 
 Triangle soups, shells with holes and overlapping pieces have no clear inside. Here a voxel belongs
-to the solid if the surface passes through it, or if a wall is met in at least five of the six
-directions along the axes: a hole on one side, as under a car, does not let the inside out.
+to the solid if the surface passes through it, or if there is a wall in at least five of the six
+directions along the axes. So a hole on one side, as under a car, does not open the inside.
 
 Source: the vote over axis-parallel rays of Nooruddin and Turk 2003, "Simplification and Repair of
 Polygonal Models Using Volumetric Techniques", IEEE TVCG 9(2), section 3.
@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from scipy.ndimage import binary_erosion, gaussian_filter
 
 FINEST = 80
-"""Voxels along the longest side, at most; large or tangled surfaces get fewer."""
+"""The most voxels along the longest side; large or tangled surfaces get fewer."""
 
 _MOST_SAMPLES = 400_000
-_WALLS = 5  # of the six directions in which a voxel inside must meet a wall
+_WALLS = 5  # the least directions, of six, with a wall around an inner voxel
 _MARGIN = 3  # voxels of air around the solid
-_BLUR = 0.7  # standard deviation [voxel] that takes the steps off the surface
+_BLUR = 0.7  # standard deviation [voxel] that smooths the steps of the surface
 _LEVEL = 0.15  # of the blurred solid: keeps walls (0.57), wires (0.33) and dots (0.18) of one voxel
 
 FloatArray = NDArray[np.float64]
@@ -39,12 +39,12 @@ class VoxelSolid:
 
     @property
     def outermost(self) -> FloatArray:
-        """Centres (S, 3) of the voxels of the solid that touch the air; cavities are no air."""
+        """Centres (S, 3) of the solid's voxels that touch the air outside."""
         skin = self.voxels & ~binary_erosion(self.voxels)
         return self.origin + self.size * np.argwhere(skin)
 
     def closed_surface(self) -> tuple[FloatArray, IntArray]:
-        """A closed surface around the solid, vertices (n, 3) and faces (m, 3).
+        """Return a closed surface around the solid, vertices (n, 3) and faces (m, 3).
 
         Raises:
             ImportError: PyGEL3D is not installed.
@@ -54,7 +54,7 @@ class VoxelSolid:
         except ImportError as error:
             raise ImportError("curve skeletons need: pip install 'bunraku[characters]'") from error
         field = gaussian_filter(self.voxels.astype(np.float32), _BLUR)
-        last = np.array(field.shape) - 1.0  # so that a vertex is given in voxels, centre to centre
+        last = np.array(field.shape) - 1.0  # vertices in voxels, from centre to centre
         manifold = hmesh.volumetric_isocontour(field, bbox_max=last, tau=_LEVEL)
         vertices = np.array(manifold.positions(), dtype=np.float64)
         faces = np.array([manifold.circulate_face(f, mode="v") for f in manifold.faces()])
@@ -62,11 +62,11 @@ class VoxelSolid:
 
 
 def voxel_solid(points: FloatArray, triangles: IntArray) -> VoxelSolid:
-    """The solid that a surface bounds, whatever its holes, pieces and inner walls.
+    """Return the solid bounded by a surface, whatever its holes, pieces and inner walls.
 
     Args:
         points: (N, 3) finite, any unit; the longest side of their box is not 0.
-        triangles: (F, 3) into `points`; any soup.
+        triangles: (F, 3) into `points`, in any arrangement.
     """
     size = float(np.ptp(points, axis=0).max()) / FINEST
     low = points.min(axis=0)
@@ -77,13 +77,13 @@ def voxel_solid(points: FloatArray, triangles: IntArray) -> VoxelSolid:
 
 
 def surface_samples(points: FloatArray, triangles: IntArray, spacing: float) -> FloatArray:
-    """Points (S, 3) on triangles (F, 3) of points (N, 3): none of the surface is `spacing` away.
+    """Return points (S, 3) on triangles (F, 3) of points (N, 3), nowhere `spacing` apart.
 
-    The spacing [the unit of `points`] grows where it would give more than some 10^6 samples.
+    The spacing [the unit of `points`] grows if it would give more than about 10^6 samples.
     """
     corners = points[triangles]
     longest = _sides(corners).max(axis=1)
-    # A triangle is halved until it is small: n times as long makes up to n^2 of it.
+    # A triangle is halved until it is small: one that is n times as long becomes up to n^2 of them.
     area = 0.5 * np.linalg.norm(
         np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
     )
@@ -113,7 +113,7 @@ def _halved(corners: FloatArray, sides: FloatArray) -> FloatArray:
 
 
 def _filled(shell: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The shell and all voxels that it walls in."""
+    """The shell and all voxels inside it."""
     walls = np.zeros(shell.shape, dtype=np.int8)
     for axis in range(3):
         walls += np.logical_or.accumulate(shell, axis=axis)
