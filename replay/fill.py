@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.compiled import kernel
 from devices.skeleton import Skeleton, SkeletonFrame
+from solvers.kernels.compiled import exact_kernel
 
 KEEP_SECONDS = 0.5
 EASE_SECONDS = 1.0
@@ -149,7 +149,7 @@ class Filler:
         return memory
 
 
-@kernel
+@exact_kernel
 def _fill(
     joints: Records, root: Array, positions: Array, filled: Bools, times: tuple[float, float, float]
 ) -> None:
@@ -164,14 +164,14 @@ def _fill(
     root[:] = positions[joints[0].order]
 
 
-@kernel
+@exact_kernel
 def was_seen(place: Array) -> bool:
     """Whether a place (3,) [m] has no NaN and lies not beyond `FARTHEST`."""
     x, y, z = np.abs(place)
     return bool(x <= FARTHEST and y <= FARTHEST and z <= FARTHEST)
 
 
-@kernel
+@exact_kernel
 def _look(joints: Records, positions: Array, filled: Bools, time: float) -> bool:
     """Tell which joints must be filled, and whether any; measure the bones that are seen."""
     for index, joint in enumerate(joints):
@@ -185,12 +185,12 @@ def _look(joints: Records, positions: Array, filled: Bools, time: float) -> bool
     return bool(filled.any())
 
 
-@kernel
+@exact_kernel
 def _is_bone(joint: Record, index: int) -> bool:
     return bool(joint.parent != index and _length(joint.rest) > 0.0)
 
 
-@kernel
+@exact_kernel
 def _scale(joints: Records) -> float:
     """How much larger the performer is than the rest pose."""
     ratios = np.empty(len(joints))
@@ -202,7 +202,7 @@ def _scale(joints: Records) -> float:
     return float(np.median(ratios[:known])) if known > 0 else 1.0
 
 
-@kernel
+@exact_kernel
 def _guess(joints: Records, scale: float, time: float, hold: float, ease: float) -> None:
     """Tell where each joint stands from its parent if it is not seen now."""
     for joint in joints:
@@ -216,7 +216,7 @@ def _guess(joints: Records, scale: float, time: float, hold: float, ease: float)
             turn(joint.offset, joint.rest * scale, w * w * (3.0 - 2.0 * w), joint.guess)
 
 
-@kernel
+@exact_kernel
 def _place(joints: Records, positions: Array, filled: Bools, root: Array) -> None:
     """Put joints that must be filled where they stand from their parents."""
     placed, order = ~filled, joints["order"]
@@ -234,7 +234,7 @@ def _place(joints: Records, positions: Array, filled: Bools, root: Array) -> Non
             positions[joint] = positions[joints[joint].parent] + joints[joint].guess
 
 
-@kernel
+@exact_kernel
 def _nearest_seen(order: Indices, filled: Bools) -> int:
     for joint in order:
         if not filled[joint]:
@@ -242,7 +242,7 @@ def _nearest_seen(order: Indices, filled: Bools) -> int:
     return int(order[0])
 
 
-@kernel
+@exact_kernel
 def _remember(joints: Records, positions: Array, filled: Bools, time: float) -> None:
     # A joint whose parent was guessed keeps its old offset only while the guess came from it;
     # elsewhere the offset from the guess is what keeps the joint still when it disappears.
@@ -252,7 +252,7 @@ def _remember(joints: Records, positions: Array, filled: Bools, time: float) -> 
             joint.seen_at = time
 
 
-@kernel
+@exact_kernel
 def turn(start: Array, end: Array, weight: float, out: Array) -> None:
     """Put a vector on its way from `start` to `end` (3,), by `weight` in [0, 1], into `out` (3,).
 
@@ -277,6 +277,6 @@ def turn(start: Array, end: Array, weight: float, out: Array) -> None:
     out[:] = length * (np.cos(angle) * a + np.sin(angle) * side)
 
 
-@kernel
+@exact_kernel
 def _length(vector: Array) -> float:
     return float(np.sqrt(vector[0] ** 2 + vector[1] ** 2 + vector[2] ** 2))

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.compiled import kernel
+from solvers.kernels.compiled import exact_kernel
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -90,7 +90,7 @@ class WorldPose(NamedTuple):
     confidence: Array
 
 
-@kernel
+@exact_kernel
 def read_bones(
     data: Bytes, places: Indices, joints: Indices, positions: Array, rotations: Array
 ) -> bool:
@@ -119,7 +119,7 @@ def read_bones(
     return True
 
 
-@kernel
+@exact_kernel
 def _float32(data: Bytes, place: int) -> float:
     """The big-endian float32 at an offset of a packet."""
     bits = 0
@@ -128,7 +128,7 @@ def _float32(data: Bytes, place: int) -> float:
     return float(np.uint32(bits).view(np.float32))
 
 
-@kernel
+@exact_kernel
 def pose_in_world(
     bones: Bones, structure: Structure, axes: Axes, tracking: bool, out: WorldPose
 ) -> None:
@@ -150,7 +150,7 @@ def pose_in_world(
     _judge(bones, structure.seen, tracking, out)
 
 
-@kernel
+@exact_kernel
 def _normalise(bones: Bones, axes: Axes, offsets: Array, turns: Array) -> None:
     """Convert rotations and offsets to a model whose bones have the world's axes at rest.
 
@@ -163,7 +163,7 @@ def _normalise(bones: Bones, axes: Axes, offsets: Array, turns: Array) -> None:
         _rotate(axes.upper[joint], bones.positions[joint], offsets[joint])
 
 
-@kernel
+@exact_kernel
 def _complete(bones: Bones, structure: Structure, offsets: Array) -> None:
     """Complete the offsets (J, 3) [m] from the parents: as sent if plausible, else the default."""
     hips = structure.order[0]
@@ -182,7 +182,7 @@ def _complete(bones: Bones, structure: Structure, offsets: Array) -> None:
             offsets[joint] -= offsets[above]
 
 
-@kernel
+@exact_kernel
 def _check_offsets(given: Array, structure: Structure, sent: Mask, usable: Mask) -> float:
     """Mark the plausible bone offsets (J, 3) [m]; never the hips', which are not a bone.
 
@@ -206,7 +206,7 @@ def _check_offsets(given: Array, structure: Structure, sent: Mask, usable: Mask)
     return float(scale)
 
 
-@kernel
+@exact_kernel
 def _place_pinned(hips: int, bones: Bones, offsets: Array, turns: Array) -> None:
     """Place the hips on the model's root, and pinned joints at their world poses."""
     root_turn = bones.root[3:]
@@ -219,7 +219,7 @@ def _place_pinned(hips: int, bones: Bones, offsets: Array, turns: Array) -> None
             turns[joint] = bones.pinned_rotations[joint]
 
 
-@kernel
+@exact_kernel
 def _judge(bones: Bones, seen: Mask, tracking: bool, out: WorldPose) -> None:
     """Set confidences: 1 as sent, INFERRED if rigid with a sent bone, at most UNSURE if old."""
     for joint in range(len(seen)):
@@ -234,7 +234,7 @@ def _judge(bones: Bones, seen: Mask, tracking: bool, out: WorldPose) -> None:
             out.rotations[joint] = np.nan
 
 
-@kernel
+@exact_kernel
 def _rotate(q: Array, v: Array, out: Array) -> None:
     """Rotate a vector (3,) by a unit quaternion; `out` may be `v`."""
     x, y, z, w = q
@@ -248,7 +248,7 @@ def _rotate(q: Array, v: Array, out: Array) -> None:
     )
 
 
-@kernel
+@exact_kernel
 def _multiply(p: Array, q: Array, out: Array) -> None:
     """Multiply quaternions: the rotation q, then p; `out` may be either."""
     px, py, pz, pw = p
@@ -262,11 +262,11 @@ def _multiply(p: Array, q: Array, out: Array) -> None:
     )
 
 
-@kernel
+@exact_kernel
 def _put3(out: Array, x: float, y: float, z: float) -> None:
     out[0], out[1], out[2] = x, y, z
 
 
-@kernel
+@exact_kernel
 def _put4(out: Array, x: float, y: float, z: float, w: float) -> None:
     out[0], out[1], out[2], out[3] = x, y, z, w

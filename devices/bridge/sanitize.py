@@ -7,7 +7,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.compiled import kernel
+from solvers.kernels.compiled import exact_kernel
 
 Array = NDArray[np.float64]
 
@@ -15,7 +15,7 @@ _UNIT = 1e-6  # largest deviation from 1 of the length of a unit quaternion
 _LARGEST = 1e6  # largest component of a quaternion
 
 
-@kernel
+@exact_kernel
 def make_safe(positions: Array, confidence: Array, quaternions: Array) -> None:
     """Correct impossible numbers in place.
 

@@ -15,8 +15,8 @@ from typing import Generic, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.compiled import kernel
 from devices.osc.messages import BUNDLE, Message, numbers_at_end
+from solvers.kernels.compiled import exact_kernel
 
 Bytes = NDArray[np.uint8]
 Span = tuple[int, int]
@@ -79,7 +79,7 @@ class Layouts(Generic[Plan]):
         self._by_length.clear()
 
 
-@kernel
+@exact_kernel
 def _same(data: Bytes, mask: Bytes, pattern: Bytes) -> bool:
     """Whether packets (N,) agree in the bits of a mask."""
     other = np.uint8(0)

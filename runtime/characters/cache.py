@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import io
 import os
-import sys
 import tempfile
 import zipfile
 from collections.abc import Callable
@@ -14,6 +13,8 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+from solvers.kernels.cache import cache_folder
 
 Tree = tuple[NDArray[np.int64], NDArray[np.float64]]  # parents (K,), positions (K, 3)
 Extract = Callable[[NDArray[np.float64], NDArray[np.int64]], Tree]
@@ -36,18 +37,6 @@ def cached_skeleton(
         with suppress(OSError):
             _store(path, tree)
     return tree
-
-
-def cache_folder() -> Path:
-    """The folder for what can be computed again, by the custom of the platform."""
-    home = Path(os.path.expanduser("~"))  # noqa: PTH111  # Path.home raises where there is none
-    if sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA") or home / "AppData" / "Local")
-    elif sys.platform == "darwin":
-        base = home / "Library" / "Caches"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or home / ".cache")
-    return base / "bunraku"
 
 
 def _key(vertices: NDArray[np.float64], faces: NDArray[np.int64], version: int) -> str:

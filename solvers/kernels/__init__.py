@@ -1,1 +1,5 @@
-"""How compiled code is made and cached; vector and quaternion types for use inside it."""
+"""How kernels are compiled and cached; vectors and quaternions for use in them."""
+
+from solvers.kernels.processor import choose_processor
+
+choose_processor()

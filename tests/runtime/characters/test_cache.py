@@ -2,13 +2,14 @@ from __future__ import annotations
 
 import io
 import pickle
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from runtime.characters import cache
-from runtime.characters.cache import cache_folder, cached_skeleton
+from runtime.characters.cache import cached_skeleton
+from solvers.kernels.cache import cache_folder
 
 VERTICES = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
 FACES = np.array([[0, 1, 2]])
@@ -137,13 +138,13 @@ def test_a_folder_that_cannot_be_made_is_no_error(home: Path) -> None:
 def test_the_folder_follows_the_platform(
     home: Path, monkeypatch: pytest.MonkeyPatch, platform: str, where: str
 ) -> None:
-    monkeypatch.setattr(cache.sys, "platform", platform)
+    monkeypatch.setattr(sys, "platform", platform)
     assert cache_folder() == home / where
 
 
 def test_without_a_setting_it_lies_in_the_home_folder(
     home: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(cache.sys, "platform", "linux")
+    monkeypatch.setattr(sys, "platform", "linux")
     monkeypatch.delenv("XDG_CACHE_HOME")
     assert cache_folder() == home / ".cache" / "bunraku"
