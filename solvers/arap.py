@@ -45,7 +45,7 @@ from solvers.deform.rotation_priors import (
 )
 from solvers.deform.solver_state import DeformationState
 from solvers.kernels.compiled import most_threads, threads_for
-from solvers.linear.constrained_system import ConstrainedSystem, Hold
+from solvers.linear.constrained_system import ConstrainedSystem, Constraints
 from solvers.linear.laplacian import Floats, Ints
 
 SMOOTH_ROTATIONS = "smooth-rotations"
@@ -93,7 +93,7 @@ class ArapSolver:
         self._mesh = build_cells(self._rest, layout.faces, energy)
         self._unit = float(self._mesh.laplacian.diagonal().mean()) or 1.0
         self._carried = CarriedParts.of(self._rest, self._handles, layout)
-        self._system = ConstrainedSystem(self._mesh.laplacian, layout.tree, self._held())
+        self._system = ConstrainedSystem(self._mesh.laplacian, layout.tree, self._constraints())
         self._influence = HandleInfluence(self._system, self._handles)
         count = len(points)
         smoothing = SMOOTHNESS * _area(self._rest, layout.faces)
@@ -138,7 +138,7 @@ class ArapSolver:
         goals[kept] = self._goals[old]
         self._goals, self._handles = goals, new
         self._carried = CarriedParts.of(self._rest, new, self._layout)
-        self._system.hold(self._held())
+        self._system.constrain(self._constraints())
         self._influence.hold(new)
 
     def weigh(self, weights: ArrayLike) -> None:
@@ -148,7 +148,7 @@ class ArapSolver:
             ValueError: for weights of a wrong shape or below zero; the solver is then unchanged.
         """
         self._handles = self._handles.reweighted(weights)
-        self._system.hold(self._held())
+        self._system.constrain(self._constraints())
         self._influence.reweigh(self._handles)
 
     def stiffen(self, region_of: ArrayLike, rigidity: ArrayLike) -> None:
@@ -213,7 +213,7 @@ class ArapSolver:
         if state.handles is not self._handles:
             self._handles = state.handles
             self._carried = CarriedParts.of(self._rest, self._handles, self._layout)
-            self._system.restore(self._held(), state.precision)
+            self._system.restore(self._constraints(), state.precision)
         self._influence.restore(state.influence)
         self._x[:], self._R[:], self._goals = state.positions, state.rotations, state.goals
         self._shown = self._x
@@ -313,9 +313,9 @@ class ArapSolver:
             fit_cells(x, cells, self._R, self._laplace_x, self._room)
 
     def _global_step(self) -> None:
-        held, places = self._system.held, self._handles.places
-        residual(self._R, self._laplace_x, self._mesh.cells, held.fixed, self._residual)
-        pull_soft(places, held.stiffness, self._goals, self._x, self._residual)
+        constraints, places = self._system.constraints, self._handles.places
+        residual(self._R, self._laplace_x, self._mesh.cells, constraints.fixed, self._residual)
+        pull_soft(places, constraints.stiffness, self._goals, self._x, self._residual)
         self._system.add_solution(self._residual, self._x)
 
     def _pose_step(self) -> Floats:
@@ -375,26 +375,10 @@ class ArapSolver:
         energy_terms(x, self._R, self._rest, self._mesh.terms, self._energy_terms)
         return float(self._energy_terms.sum())
 
-    def _held(self) -> Hold:
-        return self._carried.hold(self._handles, len(self._rest), self._unit)
+    def _constraints(self) -> Constraints:
+        return self._carried.constraints(self._handles, len(self._rest), self._unit)
 
 
 def _area(points: Floats, faces: Ints) -> float:
     a, b, c = (points[faces[:, corner]] for corner in range(3))
     return 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
-
-
-def warm() -> None:
-    """Compile the kernels of the solver before a show, so that no frame waits for the compiler.
-
-    The compiled code is cached on disk. The first call takes under a minute, later calls a moment.
-    """
-    grid = np.stack(np.meshgrid(np.arange(9.0), np.arange(9.0), [0.0]), axis=-1).reshape(-1, 3)
-    a = (np.arange(8)[:, None] * 9 + np.arange(8)).ravel()
-    faces = np.concatenate([np.stack([a, a + 1, a + 10], 1), np.stack([a, a + 10, a + 9], 1)])
-    solver = ArapSolver(grid, faces, [0, 8, 72, 80])
-    solver.solve(grid[[0, 8, 72, 80]][::-1], 1)  # a jump compiles the energy too
-    solver = ArapSolver(grid, faces, [0, 8, 72, 80], energy=SMOOTH_ROTATIONS)
-    solver.stiffen(np.zeros(81, dtype=np.int64), np.ones(81))
-    solver.stiffness = 0.5
-    solver.solve(grid[[0, 8, 72, 80]][::-1], 1)

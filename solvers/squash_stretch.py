@@ -241,7 +241,7 @@ class SquashStretchSolver(ArapSolver):
             self._measure(self._x)
             self._shape_volumes[:] = self._sums[:, 0]
         strain_cells(self._scales, self._strains)
-        push(self._pose, self._shell, self._strains, self._system.held.fixed, self._push)
+        push(self._pose, self._shell, self._strains, self._system.constraints.fixed, self._push)
         self._system.add_solution(self._push, self._swell)
         self._measure(self._pose)
         find_pressures(self._sums, self._rest_sizes, self._shape_volumes, gain, self._pressures)

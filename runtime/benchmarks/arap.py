@@ -18,7 +18,7 @@ from solvers.deform.arap_kernels import fit_cells, residual
 from solvers.deform.arap_layout import lay_out
 from solvers.deform.rotation_fit import SCRATCH
 from solvers.kernels.compiled import most_threads, parallel_kernel, threads_for
-from solvers.linear.constrained_system import ConstrainedSystem, Hold
+from solvers.linear.constrained_system import ConstrainedSystem, Constraints
 
 SIZES = (2_500, 10_000, 40_000, 160_000)
 REPEATS = 9
@@ -98,9 +98,9 @@ def _stages(
     layout = lay_out(vertices, faces)
     x = vertices[layout.order].copy()
     mesh = build_cells(x, layout.faces, SPOKES)
-    held = Hold(np.zeros(len(x), dtype=np.bool_), np.zeros(len(x)))
-    held.fixed[layout.place[handles]] = True
-    system = ConstrainedSystem(mesh.laplacian, layout.tree, held)
+    constraints = Constraints(np.zeros(len(x), dtype=np.bool_), np.zeros(len(x)))
+    constraints.fixed[layout.place[handles]] = True
+    system = ConstrainedSystem(mesh.laplacian, layout.tree, constraints)
     R, laplace_x, b = np.empty((len(x), 9)), np.empty_like(x), np.zeros_like(x)
     room = np.empty((most_threads(), SCRATCH))
     arrays = mesh.cells.fits, mesh.cells.pulls, mesh.cells.own
@@ -108,7 +108,7 @@ def _stages(
     moved += system.nbytes + 2 * (R.nbytes + laplace_x.nbytes + b.nbytes) + 3 * x.nbytes
     return {
         "local_ms": lambda: fit_cells(x, mesh.cells, R, laplace_x, room),
-        "rhs_ms": lambda: residual(R, laplace_x, mesh.cells, held.fixed, b),
+        "rhs_ms": lambda: residual(R, laplace_x, mesh.cells, constraints.fixed, b),
         "solve_ms": lambda: system.add_solution(b, x),
     }, moved
 

@@ -9,7 +9,7 @@ import numpy as np
 from solvers.deform.arap_layout import Layout
 from solvers.deform.handle_motion import Influences, fit_motions, follow, follow_one_group
 from solvers.deform.handles import Handles, nearest_groups, unheld
-from solvers.linear.constrained_system import Hold
+from solvers.linear.constrained_system import Constraints
 from solvers.linear.laplacian import Floats, Ints
 
 
@@ -31,8 +31,8 @@ class CarriedParts:
         places = unheld(handles, layout)
         return cls(places, follow_one_group(nearest_groups(rest, places, handles, layout.parts)))
 
-    def hold(self, handles: Handles, count: int, unit: float) -> Hold:
-        """Return how handles and carried parts hold `count` vertices.
+    def constraints(self, handles: Handles, count: int, unit: float) -> Constraints:
+        """Return the constraints of `count` vertices by handles and carried parts.
 
         A soft handle of weight 1 is a spring of stiffness `unit`.
         """
@@ -41,7 +41,7 @@ class CarriedParts:
         fixed[handles.places[handles.hard]] = True
         stiffness = np.zeros(count)
         stiffness[handles.places] = np.where(handles.hard, 0.0, handles.weights) * unit
-        return Hold(fixed, stiffness)
+        return Constraints(fixed, stiffness)
 
     def move(self, rest: Floats, handles: Handles, goals: Floats, x: Floats) -> None:
         """Move the parts in x (N, 3) rigidly from rest, as the handles move to `goals` (H, 3)."""

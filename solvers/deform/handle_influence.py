@@ -77,7 +77,7 @@ class HandleInfluence:
 
     def __init__(self, system: ConstrainedSystem, handles: Handles) -> None:
         self._system = system
-        self._scratch = np.empty((len(system.held.fixed), 3))
+        self._scratch = np.empty((len(system.constraints.fixed), 3))
         self._changed = False
         self._begin(handles)
         self._complete()

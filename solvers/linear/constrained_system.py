@@ -1,10 +1,10 @@
-"""The linear system of the global step: a surface's Laplacian, held by handles that come and go.
+"""The linear system of the global step: a surface's Laplacian with constraints that may change.
 
-Every vertex is an unknown, whatever holds it, so that the order of elimination and the blocks of
+Every vertex is an unknown, constrained or not, so that the order of elimination and the blocks of
 the factor are made once (Celikcan et al. 2015, section 4, reuse the permutation in the same way).
-A vertex that is fixed has its row and column cleared but for the diagonal; a soft handle adds its
-stiffness to the diagonal. When handles change, only the numbers are factored again, and of those
-only the subtrees that are concerned.
+The row and column of a fixed vertex are cleared except for the diagonal; a spring adds its
+stiffness to the diagonal. When constraints change, only the numbers are factored again, and only
+in the subtrees where they change.
 """
 
 from __future__ import annotations
@@ -16,19 +16,20 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from solvers.kernels.compiled import kernel
-from solvers.linear.block_factor import BlockFactor, Entries
+from solvers.linear.block_factor import BlockFactor
+from solvers.linear.blocks import Entries
 from solvers.linear.laplacian import Floats, Ints
 from solvers.linear.nested_dissection import Dissection
 
 Bools = NDArray[np.bool_]
 
 
-class Hold(NamedTuple):
-    """What holds N vertices.
+class Constraints(NamedTuple):
+    """The constraints of N vertices.
 
     Attributes:
-        fixed: (N,) bool, whose correction is zero.
-        stiffness: (N,) of the spring that pulls each to its target, 0 for none.
+        fixed: (N,) bool, vertices whose correction is zero.
+        stiffness: (N,) of the spring that pulls each vertex to its target, 0 for none.
     """
 
     fixed: Bools
@@ -36,51 +37,54 @@ class Hold(NamedTuple):
 
 
 class ConstrainedSystem:
-    """A Laplacian (N, N) in the order of a dissection, factored with what holds it.
+    """A Laplacian (N, N) in the order of a dissection, factored with its constraints.
 
     Attributes:
-        held: what holds it.
+        constraints: the present ones.
     """
 
-    def __init__(self, laplacian: sp.csr_matrix, tree: Dissection, held: Hold) -> None:
+    def __init__(
+        self, laplacian: sp.csr_matrix, tree: Dissection, constraints: Constraints
+    ) -> None:
         matrix = laplacian.sorted_indices()
         self._entries = Entries(
             matrix.indptr.astype(np.int32), matrix.indices.astype(np.int32), matrix.data
         )
-        self.held = held
-        values = _held_values(self._entries, held)
+        self.constraints = constraints
+        values = _constrained_values(self._entries, constraints)
         system = sp.csr_matrix((values, matrix.indices, matrix.indptr), shape=matrix.shape)
         self._factor = BlockFactor(system, tree)
 
-    def hold(self, held: Hold) -> None:
-        """Be held otherwise from now on."""
-        self.held = held
-        self._factor.refactor(_held_values(self._entries, held))
+    def constrain(self, constraints: Constraints) -> None:
+        """Replace the constraints and factor again."""
+        self.constraints = constraints
+        self._factor.refactor(_constrained_values(self._entries, constraints))
 
     @property
     def precision(self) -> np.dtype[Any]:
-        """The type of the factor's numbers; what held the system before may have decided it."""
+        """The type of the factor's numbers; earlier constraints may have decided it."""
         return self._factor.precision
 
-    def restore(self, held: Hold, precision: np.dtype[Any]) -> None:
-        """Be held as at an earlier time, when the factor had this precision."""
-        self.held = held
-        self._factor.restore(_held_values(self._entries, held), precision)
+    def restore(self, constraints: Constraints, precision: np.dtype[Any]) -> None:
+        """Take the constraints of an earlier time, when the factor had this precision."""
+        self.constraints = constraints
+        self._factor.restore(_constrained_values(self._entries, constraints), precision)
 
     def add_solution(self, b: Floats, x: Floats) -> None:
-        """Add to x (N, 3) the correction that b (N, 3) asks for."""
+        """Add to x (N, 3) the solution for the right-hand side b (N, 3)."""
         self._factor.add_solution(b, x)
 
     def harmonic(self, group_at: Ints, first: int, out: Floats) -> None:
-        """Put how far each vertex goes along with groups first, first + 1, first + 2 into out.
+        """Put the shares of groups first, first + 1, first + 2 in each vertex into out (N, 3).
 
-        A group's share (N,) is harmonic, one where it holds a vertex hard and zero where another
-        does; `group_at` (N,) is the group at each vertex, or -1. All groups' shares sum to one.
+        A group's share (N,) is harmonic, one at the group's fixed vertices and zero at those of
+        other groups; `group_at` (N,) is the group at each vertex, or -1. The shares of all groups
+        sum to one.
 
         Source: Joshi et al. 2007, Harmonic coordinates for character articulation, section 3.
         """
         b = np.empty_like(out)
-        _pulls_of_groups(self._entries, self.held, group_at, first, b)
+        _pulls_of_groups(self._entries, self.constraints, group_at, first, b)
         self._factor.solve(b, out)
 
     @property
@@ -90,10 +94,10 @@ class ConstrainedSystem:
 
 
 @kernel
-def _held_values(laplacian: Entries, held: Hold) -> Floats:
-    """The values of the held matrix."""
+def _constrained_values(laplacian: Entries, constraints: Constraints) -> Floats:
+    """The values of the constrained matrix."""
     starts, columns = laplacian.starts, laplacian.columns
-    fixed, stiffness = held.fixed, held.stiffness
+    fixed, stiffness = constraints.fixed, constraints.stiffness
     values = laplacian.values.copy()
     for v in range(len(fixed)):
         for h in range(starts[v], starts[v + 1]):
@@ -107,11 +111,11 @@ def _held_values(laplacian: Entries, held: Hold) -> Floats:
 
 @kernel
 def _pulls_of_groups(
-    laplacian: Entries, held: Hold, group_at: Ints, first: int, out: Floats
+    laplacian: Entries, constraints: Constraints, group_at: Ints, first: int, out: Floats
 ) -> None:
-    """The right-hand sides of three groups' shares."""
+    """The right-hand sides of three groups' shares, out (N, 3)."""
     starts, columns, values = laplacian.starts, laplacian.columns, laplacian.values
-    fixed, stiffness = held.fixed, held.stiffness
+    fixed, stiffness = constraints.fixed, constraints.stiffness
     for v in range(len(fixed)):
         out[v, 0] = out[v, 1] = out[v, 2] = 0.0
         own = group_at[v] - first
