@@ -9,15 +9,17 @@ HELP = "check this machine"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments and options."""
-    parser.add_argument("--warm", action="store_true", help="compile the solvers ahead of time")
+    parser.add_argument("--warm", action="store_true", help="compile all kernels ahead of time")
 
 
 def run(options: argparse.Namespace) -> int:
     """Print a line for each thing that a show needs; the exit code is 0 when all is well."""
-    from runtime.cli.health_checks import check_all, warm_up
+    from runtime.cli.health_checks import check_all
 
     wrong = check_all()
     if options.warm:
+        from runtime.cli.warm import warm_up
+
         warm_up()
-        print("ok       warm         the solvers and the renderer are compiled")
+        print("ok       warm         all kernels of a show are compiled")
     return 1 if wrong else 0

@@ -1,4 +1,4 @@
-"""The checks of `bunraku doctor`, and a warm-up that compiles the solvers."""
+"""The checks of `bunraku doctor`."""
 
 from __future__ import annotations
 
@@ -8,29 +8,17 @@ import platform
 import socket
 import sys
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
-
 from devices.address import LOOPBACK
-from devices.bridge.messages import LATEST
-from devices.bridge.receiver import BridgeReceiver
 from devices.errors import InputError
-from devices.osc.vmc_decoder import VmcDecoder
 from devices.transport.port_owner import port_owner
 from devices.transport.udp import QUEUE
-from replay.builtin import builtin_recording
-from runtime.characters.builtin import BUILTIN, builtin_character
-from runtime.characters.cache import cache_folder
-from runtime.characters.proxy import proxy_of
 from runtime.cli.device_watch import listening_ports
 from runtime.output.files.video import encoder_for
 from runtime.render.context import headless_context, is_software, release_headless, renderer_name
 from runtime.render.egl import egl_devices
-from runtime.show.open_stream import play
-from runtime.show.settings import CharacterSettings, ShowSettings
-from runtime.show.show import Show
+from solvers.kernels.cache import cache_folder
 
 EXTRAS: dict[str, tuple[str, ...]] = {
     "characters": ("pygel3d", "fast_simplification", "manifold3d"),
@@ -45,7 +33,6 @@ EXTRAS: dict[str, tuple[str, ...]] = {
 if sys.platform in ("win32", "darwin"):
     EXTRAS["spout"] = ("SpoutGL",) if sys.platform == "win32" else ("syphon",)
 LONGEST_QUEUE = Path("/proc/sys/net/core/rmem_max")  # [bytes] the most that Linux gives a socket
-WARM_FRAMES = 3
 
 Check = Callable[[], str]
 
@@ -170,26 +157,3 @@ def _extra(extra: str, modules: tuple[str, ...]) -> str:
         hint = f"pip install 'bunraku[{extra}]'"
         return f"missing  {extra:<12} {', '.join(missing)}: {hint}"
     return f"ok       {extra:<12} {', '.join(modules)}"
-
-
-def warm_up() -> None:
-    """Perform a few frames with every built-in character, so that no show compiles anything."""
-    VmcDecoder()  # compiles the reader of its packets
-    BridgeReceiver(LATEST)
-    characters = [builtin_character(name) for name in BUILTIN]
-    proxy_of(characters[0], dense=0, count=1_000)  # as for a dense character
-    settings = ShowSettings(
-        size=(320, 180),
-        pictures=True,
-        characters=(
-            CharacterSettings(cartoon=1.0, volume_gain=1.5, stiffness=0.5),
-            *[CharacterSettings()] * (len(characters) - 1),
-        ),
-    )
-    with Show(play(builtin_recording(), every_frame=True), characters, settings) as show:
-        rest = show.puppets[1].bound_skeleton.rest_targets
-        released = replace(rest, weights=np.ones_like(rest.weights))  # as of a limb that lets go
-        show.puppets[1].surface.deform(released, 1)
-        for _ in range(WARM_FRAMES):
-            show.tick()
-            show.picture  # noqa: B018  # drawing compiles the shaders

@@ -11,6 +11,7 @@ from devices.stream import SkeletonStream
 from replay.player import Player
 from runtime.characters.open_character import load_character
 from runtime.cli.show_options import show_settings
+from runtime.cli.warm import warm_up
 from runtime.show.collector_pauses import collector_paused
 from runtime.show.outputs import check_outputs
 from runtime.show.pacing import AtOnce
@@ -41,6 +42,7 @@ def perform(
     check_outputs(
         settings, names, [*read, *(("--character", Path(name)) for name in options.character)]
     )
+    warm_up()
     with collector_paused():
         source = open_source()
     with source as stream:

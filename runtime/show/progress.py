@@ -21,8 +21,9 @@ class Progress:
     or a closed stream is no error.
 
     Args:
-        label: the work.
+            label: the work.
         total: number of steps, or None if it is not known.
+    unit: the name of a step, in the plural.
         stream: where to write; standard error if None.
         clock: monotonic time [s].
     """
@@ -32,6 +33,7 @@ class Progress:
         label: str,
         total: int | None,
         *,
+        unit: str = "frames",
         stream: TextIO | None = None,
         clock: Callable[[], float] = monotonic,
     ) -> None:
@@ -42,7 +44,7 @@ class Progress:
         self._bar: tqdm | None = None
         if self._on_terminal():
             self._bar = tqdm(
-                desc=label, total=total, file=self._stream, unit=" frames", dynamic_ncols=True
+                desc=label, total=total, file=self._stream, unit=f" {unit}", dynamic_ncols=True
             )
 
     def advance(self, steps: int = 1, *, said: str = "") -> None:

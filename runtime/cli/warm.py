@@ -1,0 +1,152 @@
+"""Compile all kernels that a show can reach before it begins, once, in two processes.
+
+The kernels of the solvers are compiled in a process of their own, all others in this one. A list
+of the files that each part needs is kept beside them, so that a later start only looks them up.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+import numpy as np
+import scipy.sparse as sp
+from numba.core import event
+
+from devices.bridge.messages import LATEST
+from devices.bridge.receiver import BridgeReceiver
+from devices.osc.vmc_decoder import VmcDecoder
+from replay.builtin import builtin_recording
+from runtime.characters.builtin import BUILTIN, builtin_character
+from runtime.characters.proxy import proxy_of
+from runtime.driving.performer import Performer
+from runtime.puppet.deformable_surface import Elasticity
+from runtime.render.smoothing import DeformingNormals, bounding_box, split_vertices
+from runtime.show.open_stream import play
+from runtime.show.progress import Progress
+from runtime.show.settings import ShowSettings
+from runtime.show.show import Show
+from solvers.arap import ENERGIES
+from solvers.kernels.cache import count_compiled, has_list, remove_unused, save_list
+from solvers.linear.block_factor import BlockFactor
+from solvers.linear.nested_dissection import dissect
+from solvers.squash_stretch import SquashStretchSolver
+
+_SOLVERS, _SHOW = "solvers", "show"
+_NOT_SHOWN = "runtime.benchmarks"
+_FRAMES = 3
+_LOOK = 0.5  # [s] between two counts while the other process compiles
+
+
+def warm_up() -> None:
+    """Compile every kernel that a show can reach and that is not in the cache."""
+    if has_list(_SOLVERS, _NOT_SHOWN) and has_list(_SHOW, _NOT_SHOWN):
+        return
+    sys.stderr.write("bunraku: compiling kernels, once: a minute or two on two free cores\n")
+    solvers = subprocess.Popen([sys.executable, "-m", "runtime.cli.warm"])
+    with _shown() as compiled:
+        _use_decoders_and_surfaces()
+        while solvers.poll() is None:
+            with suppress(subprocess.TimeoutExpired):
+                solvers.wait(_LOOK)
+            compiled.look()
+        _perform()
+        compiled.look()
+    save_list(_SHOW, _NOT_SHOWN)
+    remove_unused()
+
+
+class _Compiled(event.Listener):
+    """Shows how many kernels are compiled, each time that this process has compiled one."""
+
+    def __init__(self) -> None:
+        self._done, total = count_compiled(_NOT_SHOWN)
+        self.progress = Progress("compiling", total, unit="kernels")
+        self.progress.advance(self._done)
+
+    def look(self) -> None:
+        """Count the kernels of all processes."""
+        done, _ = count_compiled(_NOT_SHOWN)
+        self.progress.advance(done - self._done)
+        self._done = done
+
+    def on_start(self, event: object) -> None:
+        """Nothing is compiled yet."""
+
+    def on_end(self, event: object) -> None:
+        """A kernel is compiled."""
+        self.look()
+
+
+@contextmanager
+def _shown() -> Iterator[_Compiled]:
+    compiled = _Compiled()
+    with compiled.progress, event.install_listener("numba:compile", compiled):
+        yield compiled
+
+
+def use_solvers() -> None:
+    """Solve once in each way that a show can ask for."""
+    side = 9
+    grid = np.stack(np.meshgrid(np.arange(float(side)), np.arange(float(side)), [0.0]), axis=-1)
+    x = grid.reshape(-1, 3)
+    a = (np.arange(side - 1)[:, None] * side + np.arange(side - 1)).ravel()
+    faces = np.concatenate(
+        [np.stack([a, a + 1, a + side + 1], 1), np.stack([a, a + side + 1, a + side], 1)]
+    )
+    corners = np.array([0, side - 1, side * (side - 1), side * side - 1])
+    for energy in ENERGIES:
+        solver = SquashStretchSolver(x, faces, corners, energy=energy, groups=[0, 0, 1, 2])
+        solver.stiffen(np.zeros(len(x), dtype=np.int64), np.ones(len(x)))
+        for elasticity in (Elasticity(), Elasticity(1.0, 1.5, 0.5)):
+            solver.cartoon, solver.volume_gain = elasticity.cartoon, elasticity.volume_gain
+            solver.stiffness = elasticity.stiffness
+            answer = solver.solve(x[corners][::-1], 2)  # a jump
+            solver.flatten_folds(answer)
+            solver.settle()
+        solver.weigh([np.inf, 1.0, 0.0, 0.5])
+        solver.solve(x[corners], 1)
+        before = solver.snapshot()
+        solver.hold(corners[:3], groups=[0, 1, 2])
+        solver.solve(x[corners[:3]], 1)
+        solver.restore(before)
+    _factor_in_double()
+
+
+def _factor_in_double() -> None:
+    """Solve a chain that is fixed by next to nothing, for which single precision does not do."""
+    count = 400
+    link = -np.ones(count - 1)
+    matrix = sp.diags([link, np.r_[1.0 + 1e-13, np.full(count - 2, 2.0), 1.0], link], [-1, 0, 1])
+    points = np.arange(3.0 * count).reshape(count, 3)
+    tree = dissect(matrix.tocsr(), points)
+    factor = BlockFactor(sp.csr_matrix(matrix.tocsr()[tree.order][:, tree.order]), tree)
+    factor.solve(points, np.empty_like(points))
+
+
+def _use_decoders_and_surfaces() -> None:
+    """Use everything of a show that needs no solver."""
+    VmcDecoder()
+    BridgeReceiver(LATEST)
+    Performer(builtin_recording().skeleton)
+    character = builtin_character(BUILTIN[0])
+    proxy = proxy_of(character, dense=0, count=1_000)  # as for a dense character
+    proxy.follow(proxy.vertices)
+    DeformingNormals(split_vertices(character)).fill(character.vertices)
+    bounding_box(character.vertices)
+
+
+def _perform() -> None:
+    """Perform a few frames with every built-in character."""
+    characters = [builtin_character(name) for name in BUILTIN]
+    stream = play(builtin_recording(), every_frame=True)
+    with Show(stream, characters, ShowSettings()) as show:
+        for _ in range(_FRAMES):
+            show.tick()
+
+
+if __name__ == "__main__":
+    use_solvers()
+    save_list(_SOLVERS, _NOT_SHOWN)
