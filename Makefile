@@ -4,7 +4,7 @@ VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
-.PHONY: demo test check bench clean
+.PHONY: demo test check bench wheel clean
 
 demo: $(READY)
 	$(BIN)/bunraku demo --video demo.mp4 --report demo.json
@@ -19,6 +19,9 @@ check: $(READY)
 
 bench: $(READY)
 	$(BIN)/bunraku bench
+
+wheel: $(READY)
+	$(BIN)/python scripts/compiled_wheel.py dist
 
 $(READY): pyproject.toml constraints.txt scripts/system-libraries
 	sh scripts/system-libraries
