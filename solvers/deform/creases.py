@@ -9,7 +9,7 @@ Folds appear and vanish over many frames. So each frame tests one of four parts 
 and those known to be folded.
 
 A triangle is folded when its normal points against its normal at rest, turned by the cells of its
-corners; see `runtime.output.report.watchdog`.
+corners; see `solvers.surface.surface_quality`.
 """
 
 from __future__ import annotations

@@ -1,3 +1,5 @@
+"""Ranked matches, against a list of all choices; inner chains; preferences."""
+
 from itertools import combinations, permutations
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Squash and stretch: the paper's equations written out, closed forms, volumes, broken meshes."""
+"""Squash and stretch: closed forms, volumes, settings, and broken meshes."""
 
 from __future__ import annotations
 

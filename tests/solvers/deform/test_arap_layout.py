@@ -1,4 +1,4 @@
-"""What a deformation solver refuses, and how it names what is wrong."""
+"""Bad input to a deformation solver is refused, with a message that names the fault."""
 
 from __future__ import annotations
 

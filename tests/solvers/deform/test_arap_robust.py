@@ -1,4 +1,4 @@
-"""Deformation under hostile input: broken meshes, absurd handles, and the way back to sanity."""
+"""Deformation under hostile input: broken meshes, absurd handles, and recovery from them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Folded triangles are laid flat in what is shown, and nothing else is touched."""
+"""Folded triangles are flattened in the shown surface, and nothing else changes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rigid motions of groups of handles, and the surface that moves along."""
+"""Rigid motions of groups of handles, and the surface that moves with them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Smoothed rotations and articulated stiffness: their energies, and that they never rise."""
+"""Smooth rotations and stiff segments: their energies never rise."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Segments of a surface along its skeleton: where joints come, and what is stiff."""
+"""Stiff segments of a surface along its skeleton: the joints and the rigidity."""
 
 from __future__ import annotations
 

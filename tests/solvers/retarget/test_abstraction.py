@@ -1,3 +1,5 @@
+"""The hierarchy of sub-trees, its root, and the simplified source."""
+
 from itertools import pairwise
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Ranked assignments, against a list of all permutations."""
+
 from itertools import combinations, permutations
 
 import numpy as np

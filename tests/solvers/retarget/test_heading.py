@@ -1,3 +1,5 @@
+"""The heading of a body that turns, lies or spins."""
+
 import numpy as np
 import pytest
 from hypothesis import given

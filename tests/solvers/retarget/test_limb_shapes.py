@@ -1,3 +1,5 @@
+"""Likeness of limbs on the screen, and the choice of the most different poses."""
+
 from itertools import pairwise
 
 import numpy as np

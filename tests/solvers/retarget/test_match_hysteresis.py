@@ -1,3 +1,5 @@
+"""A shown match changes only after another was better for some time."""
+
 from itertools import pairwise
 
 import numpy as np

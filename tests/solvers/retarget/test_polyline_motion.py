@@ -1,3 +1,5 @@
+"""Motion from one polyline to another: bases, samples, rotations and continuity."""
+
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,3 +1,5 @@
+"""Detections are matched to known bodies by the least sum of distances."""
+
 from __future__ import annotations
 
 from itertools import permutations

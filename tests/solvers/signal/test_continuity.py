@@ -1,3 +1,5 @@
+"""Expected places of points, and limbs whose names are exchanged."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""The plane of the floor, from places where feet stood."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""Percentiles from a histogram, against NumPy's."""
+
 import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st

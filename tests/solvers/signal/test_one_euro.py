@@ -1,3 +1,5 @@
+"""The One-Euro filter: constants, lag, noise, and independence of axes."""
+
 from __future__ import annotations
 
 import math

@@ -1,3 +1,5 @@
+"""Prediction one sample ahead, and points at rest."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Filters that go back to a snapshot go on with the same bytes, whatever they were given since."""
+"""Restored filters return the same bytes as after the snapshot, whatever they did since."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Springs move as the differential equation says, in steps of any length."""
+"""Springs follow their differential equation, in steps of any length."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which handles a skeleton takes on a surface, however the surface hangs together."""
+"""The handles that bind a surface to a skeleton, for surfaces of one or many components."""
 
 from __future__ import annotations
 

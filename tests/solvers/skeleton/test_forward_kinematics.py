@@ -1,3 +1,5 @@
+"""Nodes and bones of a posed skeleton, in closed form."""
+
 import numpy as np
 import pytest
 from hypothesis import given, settings

@@ -1,4 +1,4 @@
-"""Curve skeletons: closed forms, what always holds, hostile surfaces, and real characters."""
+"""Curve skeletons: closed forms, invariants, hostile surfaces, and real characters."""
 
 from __future__ import annotations
 

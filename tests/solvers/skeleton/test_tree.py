@@ -1,3 +1,5 @@
+"""Queries on trees: order, chains, lengths, other roots."""
+
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,4 +1,4 @@
-"""Decimation keeps topology, borders and pieces, spreads vertices evenly, and is deterministic."""
+"""Decimation keeps topology, borders and components, spreads vertices evenly, and repeats."""
 
 from __future__ import annotations
 

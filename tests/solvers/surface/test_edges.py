@@ -1,3 +1,5 @@
+"""Edges of a mesh, and their stretch."""
+
 import numpy as np
 
 from solvers.surface.edges import Edges

@@ -1,4 +1,4 @@
-"""A dense surface follows a coarse one: exactly where that is exact, closely where it bends."""
+"""A dense surface follows a coarse one: exactly in rigid motion, closely in bends."""
 
 from __future__ import annotations
 

@@ -1,3 +1,5 @@
+"""Fitted skin weights reproduce a performance."""
+
 from __future__ import annotations
 
 import numpy as np
