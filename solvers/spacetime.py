@@ -61,14 +61,24 @@ class Constraint:
 def position_constraint(
     frame: int, joint: int, position: Sequence[float], axes: Sequence[int] = (0, 1, 2)
 ) -> Constraint:
-    """Return: a control point is at `position`, one number for each of `axes` (equation 22)."""
+    """Return the constraint that a control point is at `position`, by axis (equation 22).
+
+    Args:
+        frame: of the T frames.
+        joint: of the J control points.
+        position: one number for each of `axes`, in the control points' unit.
+        axes: which of x, y, z (0, 1, 2).
+    """
     return Constraint(((frame, joint, 1.0),), tuple(map(float, position)), tuple(axes))
 
 
 def velocity_constraint(
     frame: int, joint: int, velocity: Sequence[float], axes: Sequence[int] = (0, 1, 2)
 ) -> Constraint:
-    """Return: a control point moves by `velocity` from the last frame to this one (equation 23)."""
+    """Return the constraint that a control point moves by `velocity` in a frame (equation 23).
+
+    The motion is that from the frame before `frame`. Other arguments as of `position_constraint`.
+    """
     terms = (frame, joint, 1.0), (frame - 1, joint, -1.0)
     return Constraint(terms, tuple(map(float, velocity)), tuple(axes))
 
@@ -76,7 +86,10 @@ def velocity_constraint(
 def equality_constraint(
     frame: int, joint: int, other: int, axes: Sequence[int] = (1,)
 ) -> Constraint:
-    """Return: two control points are equal on `axes`, as when one foot replaces the other."""
+    """Return the constraint that two control points are equal on `axes`.
+
+    An example is the height of two feet while one takes over the ground contact from the other.
+    """
     terms = (frame, joint, 1.0), (frame, other, -1.0)
     return Constraint(terms, (0.0,) * len(axes), tuple(axes))
 
