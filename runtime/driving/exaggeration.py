@@ -1,9 +1,9 @@
-"""What makes a character move like a cartoon: what goes fast stretches, what stops is squashed.
+"""Cartoon exaggeration: limbs and body stretch when they move fast, and squash when they stop.
 
 Chenney et al. 2002, Simulating cartoon style animation, stretch a body by its speed and squash it
-where it is stopped. Here each driven limb grows longer with the speed of its tip, and the whole
-body with the speed at which it rises or falls; damped springs carry both on, so that a limb or a
-body that stops is squashed for a moment. The volume is the solver's: `solvers.squash_stretch`.
+where it stops. Here each driven limb grows with the speed of its tip, and the whole body with the
+speed at which it rises or falls. Damped springs follow both, so that a limb or a body that stops is
+squashed for a moment. The solver keeps the volume: `solvers.squash_stretch`.
 """
 
 from __future__ import annotations
@@ -19,22 +19,22 @@ from solvers.signal.springs import Springs, SpringsState
 
 Array = NDArray[np.float64]
 
-FREQUENCY = 3.0  # [1/s] of the springs: about a step's
+FREQUENCY = 3.0  # [1/s] of the springs: about that of steps
 DAMPING = 0.35  # one clear overshoot
-LIMB = 0.35  # by which share a limb grows at most
-BODY = 0.3
-FAST_LIMB = 6.0  # [1/s] limb lengths that a tip goes in a second, for most of that
-FAST_BODY = 1.2  # [1/s] body heights
-LONGEST_STEP = 0.1  # [s] between frames; after a longer one nothing is known of speeds
+LIMB = 0.35  # share by which a limb grows at most
+BODY = 0.3  # share by which the body grows at most
+FAST_LIMB = 6.0  # [1/s] limb lengths a second of a tip at which a limb grows by 0.76 of that
+FAST_BODY = 1.2  # [1/s] body heights a second, likewise
+LONGEST_STEP = 0.1  # [s] between two frames that give a speed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Strain:
-    """How far a character is stretched by its motion.
+    """The stretch of a character by its motion.
 
     Attributes:
-        limbs: (D,) the length of each driven chain, as a share of its own.
-        body: the height of the whole.
+        limbs: (D,) length of each driven chain, as a share of its length at rest.
+        body: height of the whole, as a share of its height at rest.
     """
 
     limbs: Array
@@ -46,7 +46,7 @@ class Strain:
         return self.body == 1.0 and bool((self.limbs == 1.0).all())
 
     def of_limbs(self, limbs: NDArray[np.int64]) -> Array:
-        """The lengths (n,) of these limbs, as shares of their own; -1 is none, never stretched."""
+        """Return the stretch (n,) of limbs by number (n,); -1 is no limb, which never stretches."""
         return np.append(self.limbs, 1.0)[limbs]
 
 
@@ -64,7 +64,7 @@ class ExaggerationState:
 
 
 class Exaggeration:
-    """Follows how fast a character moves.
+    """Follows the speed of a character's limbs and body, and stretches them.
 
     Args:
         lengths: (D,) [m] of the driven chains.
@@ -77,7 +77,7 @@ class Exaggeration:
         self._before: tuple[float, Array, float] | None = None
 
     def reset(self) -> None:
-        """Forget how the character moved."""
+        """Forget the motion before."""
         self._springs = _springs(len(self._sizes))
         self._before = None
 
@@ -91,13 +91,13 @@ class Exaggeration:
         self._before = state.before
 
     def strain(self, time: float, tips: Array, lift: float, amount: float) -> Strain:
-        """How far the character is stretched at a moment.
+        """Return the stretch of the character at a moment.
 
         Args:
             time: [s].
             tips: (D, 3) [m] from each chain's start to its tip.
-            lift: [m] how far the whole has risen.
-            amount: from 0, not at all, to 1.
+            lift: [m] of the whole.
+            amount: of exaggeration, from 0 (none) to 1.
         """
         passed = math.inf if self._before is None else time - self._before[0]
         pulls = np.zeros(len(self._sizes))
@@ -117,7 +117,7 @@ def _springs(count: int) -> Springs:
 
 @kernel
 def _pull(tips: Array, lift: float, sizes: Array, passed: float, out: Array) -> None:
-    """By how much each limb, and last the body, would grow (D + 1,) that moved so far [m]."""
+    """Put the growth of each limb, and last of the body, into `out` (D + 1,)."""
     count = len(tips)
     for d in range(count):
         far = math.sqrt(tips[d, 0] ** 2 + tips[d, 1] ** 2 + tips[d, 2] ** 2)

@@ -1,8 +1,8 @@
-"""How firmly limbs are held: one whose performer is lost lets go, and takes hold again softly.
+"""Softens the handles of a limb while its joints are not seen, and firms them again afterwards.
 
-A joint that is not seen is first held where it was, then eased to rest (`replay.fill`), and when it
-comes back it is somewhere else at once. The limb that it drives meanwhile hangs on soft handles, so
-that it is carried by its own surface, and neither tears off nor snaps back.
+The fill stage (`replay.fill`) keeps an unseen joint where it was, then moves it to rest. When the
+joint is seen again, it jumps. Meanwhile soft handles let the surface carry the limb, so that it
+neither tears off nor snaps back.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ from solvers.deform.handles import HARD
 
 Array = NDArray[np.float64]
 
-PATIENCE = 0.25  # [s] unseen before a limb begins to let go: what flickers is held
-LET_GO = 1.0  # [s] from firm to let go
-TAKE_HOLD = 0.5  # [s] and back
-LEVELS = 16  # of firmness; going from one to the next costs a factor
+PATIENCE = 0.25  # [s] unseen before the handles soften: flicker changes nothing
+LET_GO = 1.0  # [s] from firm to softest
+TAKE_HOLD = 0.5  # [s] from softest to firm
+LEVELS = 16  # of firmness; each change of level costs a factorization
 FIRMEST, LOOSEST = 10.0, 1e-3  # weights of soft handles
-LONGEST_STEP = 0.1  # [s] that a frame may count for
+LONGEST_STEP = 0.1  # [s] that a frame counts for at most
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -45,13 +45,13 @@ class LimbReleaseState:
 
 
 class LimbRelease:
-    """Knows how firmly each of D limbs is held.
+    """The weights of the handles of D limbs over time.
 
     Args:
         count: D.
 
     Attributes:
-        weights: (D,) of the handles of each limb.
+        weights: (D,) of the handles of each limb: see `ArapSolver.hold`.
     """
 
     def __init__(self, count: int) -> None:
@@ -59,11 +59,11 @@ class LimbRelease:
         self.reset()
 
     def reset(self) -> None:
-        """Hold every limb firmly, as in the beginning."""
+        """Make every limb firm, as at the beginning."""
         self.weights: Array = np.full(self._count, HARD)
         self._firmness = np.ones(self._count)
         self._unseen = np.zeros(self._count)
-        self._is_firm = True  # every limb, and seen
+        self._is_firm = True  # whether every limb is firm and seen
         self._time = math.nan
 
     def snapshot(self) -> LimbReleaseState:
@@ -78,7 +78,7 @@ class LimbRelease:
         self._unseen, self._is_firm, self._time = state.unseen, state.is_firm, state.time
 
     def follow(self, time: float, seen: NDArray[np.bool_]) -> bool:
-        """Take in at `time` [s] which limbs are seen (D,); whether a weight has changed."""
+        """Take in which limbs are seen (D,) at `time` [s]; return whether a weight has changed."""
         passed = time - self._time
         self._time = time
         all_seen = bool(seen.all())

@@ -1,4 +1,4 @@
-"""Which part of the performer drives which part of the character, and the file that says so."""
+"""Mappings: which chains of the performer drive which chains of the character; and their files."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from typing import Any
 from devices.errors import InputError
 from devices.skeleton import Skeleton
 
-MAX_FILE = 1 << 20  # bytes; a mapping is a page of names, not a data set
+MAX_FILE = 1 << 20  # bytes; a mapping is a page of names
 
 
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """One source polyline that drives one target polyline (AniMesh section 5.2).
+    """One source polyline that drives one target polyline (AniMesh, section 5.2).
 
     Attributes:
         source: joint indices from the root side outward, at least two.
@@ -32,10 +32,10 @@ class Drive:
 
 @dataclass(frozen=True, slots=True)
 class Mapping:
-    """Everything that drives one character.
+    """The drives of one character.
 
     Attributes:
-        drives: the pairs of polylines, those nearer to the target's root first.
+        drives: the pairs of polylines; those nearer to the target's root come first.
         score: the match's similarity, the sum of cosines of section 4.2; NaN when made by hand.
     """
 
@@ -113,7 +113,7 @@ def _node(node: object, target: Skeleton) -> int:
 
 
 def mapping_as_json(mapping: Mapping, source: Skeleton) -> dict[str, Any]:
-    """Give a mapping as `read_mapping` reads it, with node numbers for the target."""
+    """Return a mapping as `read_mapping` reads it, with node numbers for the target."""
     return {
         "score": float(mapping.score) if math.isfinite(mapping.score) else None,
         "pairs": [

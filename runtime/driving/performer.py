@@ -1,4 +1,4 @@
-"""A performer as the characters see one: whole, facing the stage, moving from a rest state."""
+"""A performer: the pose of the whole body in each frame, and the rest state it moves from."""
 
 from __future__ import annotations
 
@@ -19,27 +19,27 @@ from solvers.skeleton.tree import Tree
 
 Array = NDArray[np.float64]
 
-HIGHEST_SOLE = 0.15  # [m] an ankle; a skeleton whose lowest joint is higher does not stand at rest
+HIGHEST_SOLE = 0.15  # [m] of an ankle; a skeleton whose lowest joint is higher does not stand
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Pose:
-    """What a performer does at one moment.
+    """The pose of a performer at one moment.
 
     Attributes:
         seen: (J, 3) [m] every joint, never NaN.
-        filled: (J,) bool, joints that were not seen, or not believed, but filled in.
-        corrected: (J,) bool, joints that were seen elsewhere: not believed, or called their
-            partner's name.
-        predicted: (J,) bool, joints that are where they will be one frame later.
-        heading: [rad] about +Y, how far the whole body has turned from facing +Z.
-        hips: (3,) [m] where the hips are; the body turns about them.
-        sole: [m] how far the lowest joint is above the floor as one stands.
-        mirrored: whether left is right.
-        scaled: whether lengths were made those of the skeleton's rest pose.
-        scale: what they were multiplied by.
-        time: [s] when; nan where it does not matter.
-        performer: the number of who it is.
+        filled: (J,) bool, joints that were not seen or were rejected, and are filled in.
+        corrected: (J,) bool, joints that were seen elsewhere: rejected, or seen under the name of
+            their partner.
+        predicted: (J,) bool, joints at the position predicted for one frame later.
+        heading: [rad] about +Y, the turn of the whole body from facing +Z.
+        hips: (3,) [m] the hips; the body turns about them.
+        sole: [m] height of the lowest joint above the floor while the performer stands.
+        mirrored: whether left and right are exchanged.
+        scaled: whether lengths are scaled to those of the skeleton's rest pose.
+        scale: the factor.
+        time: [s] of the frame; NaN where it does not matter.
+        performer: the performer's number.
     """
 
     seen: Array
@@ -56,18 +56,18 @@ class Pose:
     performer: int = 0
 
     def facing(self, heading: float) -> Array:
-        """Every joint (J, 3) [m], the whole body turned so that it has this heading [rad]."""
+        """Return every joint (J, 3) [m] with the whole body turned to this heading [rad]."""
         return turned(self.seen, heading - self.heading, self.hips)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rest:
-    """The rest state: what the performer does while the character stands as it was made.
+    """The rest state: the performer's pose that corresponds to the rest pose of the character.
 
     Attributes:
         positions: (J, 3) [m] every joint.
         heading: [rad] the heading of that pose.
-        height: [m] of the hips above the floor, as one stands.
+        height: [m] of the hips above the floor while the performer stands.
     """
 
     positions: Array
@@ -76,7 +76,7 @@ class Rest:
 
 
 def rest_state(pose: Pose, heading: float | None = None) -> Rest:
-    """Make a pose the rest state, seen under `heading` [rad], under its own if that is None."""
+    """Return a pose as a rest state, turned to `heading` [rad]; with its own heading if None."""
     under = pose.heading if heading is None else heading
     height = float(pose.hips[1] - pose.seen[:, 1].min()) + pose.sole
     return Rest(pose.facing(under), under, height)
@@ -127,7 +127,7 @@ class Performer:
         heading(skeleton.rest_positions.copy(), self._pairs)
 
     def follow(self, frame: SkeletonFrame) -> Pose:
-        """Take in one frame; its pose is the newest."""
+        """Take in one frame and return its pose, which is now the newest."""
         whole = self._conditioner.condition(frame)
         positions = whole.positions
         self._heading = heading(positions, self._pairs, self._heading)
@@ -158,7 +158,7 @@ class Performer:
 
     @property
     def calibrates(self) -> bool:
-        """Whether the newest pose is a T or A that has been held, to be the rest state."""
+        """Whether the newest pose is a T or A pose that was kept still, to be the rest state."""
         return self._conditioner.calibrates
 
     def recalibrate(self) -> None:
@@ -166,7 +166,7 @@ class Performer:
         self._conditioner.recalibrate()
 
     def restated(self, rest: Rest, *, mirror: bool, scale: float) -> Rest:
-        """A rest state as it would have been: mirrored, and `scale` times as large."""
+        """Return a rest state mirrored (if `mirror`), and `scale` times as large."""
         positions = rest.positions * scale
         if mirror:
             positions = mirrored(positions, self._conditioner.partner)
@@ -174,7 +174,7 @@ class Performer:
         return Rest(positions, heading, rest.height * scale)
 
     def limb(self, chain: tuple[int, ...]) -> tuple[int, ...]:
-        """Give an arm or a leg without the bone that joins it to the trunk, two joints at least."""
+        """Return a limb without the bone that joins it to the trunk; two joints at least."""
         for start, joint in enumerate(chain[:-1]):
             part = self._parts[joint]
             if part is not None and part.kind in (Kind.UPPER_ARM, Kind.UPPER_LEG):
@@ -182,5 +182,5 @@ class Performer:
         return chain
 
     def rest_tree(self) -> Tree:
-        """The chosen joints as a tree, standing as the skeleton does at rest."""
+        """Return the chosen joints as a tree, in the rest pose of the skeleton."""
         return Tree(self._parents, self.skeleton.rest_positions[self.joints])

@@ -1,8 +1,8 @@
-"""How far a character's limbs may turn: those that would tear or crush its surface are held back.
+"""Limits the turns of a character's limbs so that they neither tear nor crush its surface.
 
-A limb that has grown together with the body (an arm and its cape) would tear it when it turns as
-far as the performer's; one that is shorter than it is wide would crush itself. Each turns by a
-share of the performer's turns instead, the same for the whole show.
+An arm that has grown together with a cape would tear it if it turned as far as the performer's. A
+limb that is shorter than it is wide would crush itself. Such a limb turns by a share of the
+performer's turns, its gain, which is the same for the whole show.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from solvers.signal.histogram import Counts, count, percentile
 Array = NDArray[np.float64]
 
 MOST_STRETCH = 0.4  # of an edge
-OF_ALL = 99.0  # percentile of all edges in all poses that may stretch no more
-OF_LIMB = 95.0  # percentile of a limb's edges in any one pose that may stretch no more
-EASY = 0.75  # of that: a pose that stretches less is not tried again
+OF_ALL = 99.0  # percentile of all edges in all poses that is bounded by it
+OF_LIMB = 95.0  # percentile of a limb's edges in any one pose that is bounded by it
+EASY = 0.75  # share of it: a pose that stretches less is not tried again
 ROUNDS = 16  # at most
-STEPS = (0.75, 0.9)  # least and greatest share by which a limb is held back in a round
-HELPED = 0.98  # of the stretch that was: with more left, it is not this limb's doing
+STEPS = (0.75, 0.9)  # least and greatest factor of a limb's gain in a round
+HELPED = 0.98  # of the stretch before: if more is left, the limb is not the cause
 
-_BIN = 0.002  # of stretch: what a percentile is exact to
-_BINS = 2001  # so stretches up to 4 are told apart; all above count as 4
+_BIN = 0.002  # of stretch: the precision of a percentile
+_BINS = 2001  # for stretches up to 4; all above count as 4
 
 
 def limit_turns(puppet: Puppet, driver: MappedDriver, poses: Sequence[Pose]) -> Array:
@@ -65,15 +65,15 @@ def corners_of(boxes: Array) -> Array:
 
 
 class _Trial:
-    """T poses that a puppet of D limbs goes through.
+    """T poses that a puppet of D limbs tries.
 
-    What a pose showed before a limb was held back stays as it was: smaller turns stretch no pose
-    more, so it is a bound from above until the pose is tried again.
+    The stretch of a pose is not measured again for every gain: smaller turns stretch no pose more,
+    so the old measurement is an upper bound until the pose is tried again.
 
     Attributes:
-        boxes: (T, 2, 3) [m] corners of what it fills in each.
-        limb_edges: (T, D, B) how many of the edges that each limb pulls at stretch how much.
-        all_edges: (T, B) how many of all edges do.
+        boxes: (T, 2, 3) [m] corners of the puppet in each pose.
+        limb_edges: (T, D, B) histogram of the stretch of the edges that each limb pulls at.
+        all_edges: (T, B) histogram of the stretch of all edges.
     """
 
     def __init__(self, puppet: Puppet, driver: MappedDriver, poses: Sequence[Pose]) -> None:
@@ -89,14 +89,14 @@ class _Trial:
             self.attempt(number)
 
     def repeat(self, tightness: Array) -> None:
-        """Try again those that were not easy, (T,)."""
+        """Try those poses again that were not easy by their tightness (T,)."""
         for number in np.flatnonzero(tightness > EASY * MOST_STRETCH).tolist():
             self.attempt(number)
 
     def worst(self, limb: int) -> tuple[int, float]:
-        """The pose that is worst for what a limb pulls at, and how tight that is there.
+        """Return the pose that stretches a limb's edges most, and their stretch in it.
 
-        Where it is not too tight anywhere, a pose and a bound for it.
+        If no pose stretches them too far, return some pose and an upper bound.
         """
         while True:
             tight = _tight(self.limb_edges[:, limb], OF_LIMB)
@@ -118,28 +118,28 @@ class _Trial:
 
 
 def _tight(counts: Counts, percent: float) -> Array:
-    """The stretch (...) that so many percent of the edges counted (..., B) do not pass."""
+    """Return the percentile (...) of stretch of histograms (..., B)."""
     return percentile(counts, _BIN, percent)
 
 
 def _tightness(trial: _Trial) -> Array:
-    """How tight (D,) what each limb pulls at is, over all poses."""
+    """Return the stretch (D,) of the edges that each limb pulls at, over all poses."""
     tight = _tight(trial.limb_edges.sum(axis=0), OF_ALL)
-    if tight.max(initial=0.0) <= MOST_STRETCH:  # the fault lies where no limb is: with all
+    if tight.max(initial=0.0) <= MOST_STRETCH:  # no limb alone is the cause: all are
         return np.full(len(tight), MOST_STRETCH / STEPS[1])
     return tight
 
 
 def _steps(tight: Array | float) -> Array:
-    """By what share limbs as tight as this are held back in a round; 1 for those that are not."""
+    """Return the factor of the gains of limbs with this stretch; 1 where it is small enough."""
     shares = np.clip(MOST_STRETCH / np.maximum(tight, MOST_STRETCH), STEPS[0], 1.0)
     return np.where(shares < 1.0, np.minimum(shares, STEPS[1]), 1.0)
 
 
 def _spare(driver: MappedDriver, trial: _Trial, limb: int) -> None:
-    """Hold one limb back until its edges are crushed in no pose, or that helps no more.
+    """Reduce one limb's gain until no pose crushes its edges, or a smaller gain does not help.
 
-    The worst pose says how far, and whether it helps; others are tried again only where they may
+    The worst pose decides how far, and whether it helps. Others are tried again only where they may
     have become the worst.
     """
     for _ in range(ROUNDS):

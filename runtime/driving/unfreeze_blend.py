@@ -33,9 +33,9 @@ class _Offset:
     """How far the frozen pose was from the performer's when the characters were let go.
 
     Attributes:
-        turns: (J, 3) [rad] rotation vectors that take each joint's bone to the one shown, in the
+        turns: (J, 3) [rad] rotation vectors from each joint's bone to the bone shown, in the
             body's frame.
-        lengths: (J, 3) [m] what is missing then.
+        lengths: (J, 3) [m] the difference that remains after the turn.
         heading: [rad] in [-pi, pi).
         hips: (3,) [m].
     """
@@ -136,7 +136,7 @@ class UnfreezeBlend:
         return replace(pose, time=pose.time - self._stood) if self._stood > 0.0 else pose
 
     def _bones(self, pose: Pose) -> Array:
-        """Of each joint (J, 3) [m] the way from its parent, the body facing +Z."""
+        """The vector (J, 3) [m] from each joint's parent to the joint, the body facing +Z."""
         places = pose.facing(0.0)
         bones: Array = places - places[self._parents]
         return bones
@@ -152,7 +152,7 @@ class UnfreezeBlend:
         )
 
     def _eased(self, pose: Pose, offset: _Offset) -> Pose:
-        """The pose with what is left of the offset."""
+        """The pose, moved by what is left of the offset."""
         if self._passed >= SECONDS:
             self._offset = None
             return pose
@@ -169,10 +169,10 @@ class UnfreezeBlend:
 
 
 def shortest_turns(bones: Array, wanted: Array) -> Array:
-    """Rotation vectors (n, 3) [rad] of the shortest turns that take directions to others.
+    """Return rotation vectors (n, 3) [rad] of the shortest turns from directions to others.
 
-    Opposite ones, which have no shortest, turn through the front, and what lies along +Z or -Z
-    over the top. One without length is not turned.
+    Opposite directions, which have no shortest turn, turn through the front (+Z); those along +Z
+    or -Z turn over the top (+Y). A vector without length is not turned.
 
     Args:
         bones: (n, 3) any length.

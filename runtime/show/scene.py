@@ -1,4 +1,4 @@
-"""The house: stage, camera, the puppets on it and the mirror that shows the performer."""
+"""The scene: a stage with the puppets on it, the camera, and the inset of the performer."""
 
 from __future__ import annotations
 
@@ -24,28 +24,28 @@ from runtime.render.tubes import PAIR_COLOURS
 if TYPE_CHECKING:
     import moderngl
 
-GAP = 0.18  # metres of floor between two characters
-BLACKOUT = 0.3  # seconds until all is dark, and until it is light again
-ROOM = 0.12  # share of its size that a character may move beyond its rest pose and stay in view
+GAP = 0.18  # [m] of floor between two characters
+BLACKOUT = 0.3  # [s] to black, and back to light
+ROOM = 0.12  # share of a character's size that stays in view around its rest pose
 
 
 class Scene:
-    """Puts characters side by side on one stage and shows what they do.
+    """Puts characters side by side on one stage and draws their motion.
 
     Args:
-        context: the GL context of this thread.
+        context: the OpenGL context of this thread.
         size: width and height of the picture [px].
-        puppets: who is on stage, from left to right.
-        performer: the skeleton shown in the mirror.
-        background: what is there instead of house and floor; then it is plain, and without names.
-        plain: neither the matched chains nor the mirror.
+        puppets: on the stage, from left to right.
+        performer: the skeleton that the inset shows.
+        background: replaces backdrop and floor; the picture is then plain and without captions.
+        plain: draw neither the highlights nor the inset.
         clock: host monotonic time [s].
 
     Attributes:
-        stage: draws.
-        camera: where the picture is taken from.
-        highlights: whether the matched chains are shown.
-        blackout: 1 where nothing of the show is to be seen.
+        stage: draws the characters and the inset.
+        camera: the view of the picture.
+        highlights: whether the drivers' highlights are drawn.
+        blackout: 0 for light, 1 for black.
     """
 
     def __init__(
@@ -80,11 +80,11 @@ class Scene:
         self.frame_all()
 
     def frame_all(self, filled: NDArray[np.float64] | None = None) -> None:
-        """Move the camera to where every character is in view, with room to move.
+        """Move the camera so that every character is in view, with room to move.
 
         Args:
-            filled: (A, 2, 3) [m] what each puppet is known to fill in the show, in its own
-                coordinates; when None what was known before, else a guess from the rest poses.
+            filled: (A, 2, 3) [m] corners of all that each puppet fills in the show, in its own
+                coordinates. If None, those given before; if none were, a guess by the rest poses.
         """
         boxes = self.stage.boxes
         self._filled = filled = self._filled if filled is None else filled
@@ -101,31 +101,29 @@ class Scene:
         self.camera = self.camera.frame(boxes, self.stage.aspect)
 
     def show(self, pose: Pose | None, motions: Sequence[Motion]) -> None:
-        """Draw the puppets as they are now, and the performer in the mirror."""
+        """Draw the puppets as they are now, and the performer in the inset."""
         self.upload(motions)
         self.draw(pose)
 
     def upload(self, motions: Sequence[Motion]) -> None:
-        """Give the GPU the puppets as they are now."""
+        """Upload the vertices of the puppets to the GPU."""
         for character, motion in zip(self._characters, motions, strict=True):
             character.update(motion.vertices)
 
     def draw(self, pose: Pose | None) -> None:
-        """Draw what was uploaded, the chains as they are now, and the performer in the mirror."""
-        for character, puppet in zip(self._characters, self._puppets, strict=True):
-            lit = puppet.highlights if self.highlights else []
+        """Draw the uploaded puppets with their highlights, and the performer in the inset."""
+        highlights = [puppet.highlights for puppet in self._puppets]
+        for character, own in zip(self._characters, highlights, strict=True):
+            lit = own if self.highlights else []
             character.highlight([each.points for each in lit], _colours(len(lit)))
         if self._inset is not None and pose is not None:
-            self._inset.update(
-                pose.seen,
-                colours=_joint_colours(len(pose.seen), self._puppets[0].highlights),
-                dimmed=pose.filled,
-            )
+            colours = _joint_colours(len(pose.seen), highlights[0])
+            self._inset.update(pose.seen, colours=colours, dimmed=pose.filled)
         self.stage.brightness = 1.0 - self.blackout.level
         self.stage.draw(self.camera, self._inset if pose is not None else None)
 
     def picture(self) -> NDArray[np.uint8]:
-        """The newest picture (H, W, 4): sRGB with straight alpha, top row first."""
+        """Return the newest picture (H, W, 4): sRGB with straight alpha, top row first."""
         return self.stage.read()
 
     def close(self) -> None:
@@ -134,7 +132,7 @@ class Scene:
 
 
 def _side_by_side(characters: Sequence[Character]) -> list[float]:
-    """Where on the x axis [m] each character stands, the row centred."""
+    """Return the x coordinate [m] of each character in a row that is centred."""
     places, right = [], 0.0
     for character in characters:
         low, high = character.vertices[:, 0].min(), character.vertices[:, 0].max()
@@ -147,7 +145,7 @@ def _side_by_side(characters: Sequence[Character]) -> list[float]:
 
 
 def _colours(count: int) -> NDArray[np.float64]:
-    """Linear RGB (C, 3) of so many chains."""
+    """Linear RGB (C, 3) of `count` highlights, in order."""
     return PAIR_COLOURS[np.arange(count) % len(PAIR_COLOURS)]
 
 

@@ -14,9 +14,9 @@ from devices.skeleton import Skeleton, SkeletonFrame
 from replay.recording import Recording
 from runtime.characters.character import Character, Material, Surface
 from runtime.driving.mapping import Drive, Mapping
-from runtime.driving.performer import Rest
+from runtime.driving.performer import Performer, Pose, Rest, rest_state
 from runtime.driving.polyline_driver import PolylineDriver
-from runtime.puppet.puppet import Puppet
+from runtime.puppet.puppet import Motion, Puppet
 from solvers.retarget.heading import turned
 
 BODY = builtin_skeleton()
@@ -118,6 +118,11 @@ ARMS = (drive("ArmLeft", LEFT_ARM), drive("ArmRight", RIGHT_ARM))
 LEGS = (drive("LegLeft", LEFT_LEG), drive("LegRight", RIGHT_LEG))
 
 
+def seen(positions: NDArray[np.float64]) -> Pose:
+    """The pose of a performer of whom this is the first frame."""
+    return Performer(BODY).follow(frame(positions))
+
+
 def driven_by(puppet: Puppet, drives: Sequence[Drive], rest: Rest) -> PolylineDriver:
     """A new driver of a puppet, which these drives move from this rest state."""
     driver = PolylineDriver(BODY, puppet.character, puppet.bound_skeleton, puppet.surface)
@@ -125,6 +130,24 @@ def driven_by(puppet: Puppet, drives: Sequence[Drive], rest: Rest) -> PolylineDr
     driver.prepare((), rest)
     puppet.drive_with(driver)
     return driver
+
+
+def driven(puppet: Puppet, drives: Sequence[Drive]) -> Pose:
+    """Let the drives of a performer who stands at rest drive a puppet that stands at rest."""
+    puppet.rest()
+    puppet.surface.reset()
+    start = seen(pose())
+    driven_by(puppet, drives, rest_state(start))
+    return start
+
+
+def perform(puppet: Puppet, poses: Sequence[NDArray[np.float64]]) -> list[Motion]:
+    """Let a puppet follow a performer through poses, 30 a second."""
+    performer, motions = Performer(BODY), []
+    for number, positions in enumerate(poses):
+        puppet.follow(performer.follow(frame(positions, number / 30.0)))
+        motions.append(puppet.deform())
+    return motions
 
 
 def pose(

@@ -12,38 +12,40 @@ from solvers.deform.handles import HARD
 from tests.runtime.stick_figures import ARMS, BODY, driven_by, frame, make_figure, pose, waving
 
 
-def held(grip: LimbRelease, seen: list[bool], seconds: float, start: float) -> list[np.ndarray]:
+def held(
+    limb_release: LimbRelease, seen: list[bool], seconds: float, start: float
+) -> list[np.ndarray]:
     weights = []
     for k in range(round(seconds * 60.0)):
-        grip.follow(start + k / 60.0, np.array(seen))
-        weights.append(grip.weights)
+        limb_release.follow(start + k / 60.0, np.array(seen))
+        weights.append(limb_release.weights)
     return weights
 
 
 def test_what_is_seen_is_held_firmly():
-    grip = LimbRelease(2)
-    assert all((w == HARD).all() for w in held(grip, [True, True], 3.0, 0.0))
+    limb_release = LimbRelease(2)
+    assert all((w == HARD).all() for w in held(limb_release, [True, True], 3.0, 0.0))
 
 
 def test_a_flicker_changes_nothing():
-    grip = LimbRelease(1)
-    held(grip, [True], 0.5, 0.0)
+    limb_release = LimbRelease(1)
+    held(limb_release, [True], 0.5, 0.0)
     for start in (0.5, 1.0, 1.5):  # however often
-        assert all((w == HARD).all() for w in held(grip, [False], 0.9 * PATIENCE, start))
-        held(grip, [True], 0.25, start + 0.25)
+        assert all((w == HARD).all() for w in held(limb_release, [False], 0.9 * PATIENCE, start))
+        held(limb_release, [True], 0.25, start + 0.25)
 
 
 def test_a_lost_limb_lets_go_step_by_step_and_takes_hold_faster():
-    grip = LimbRelease(2)
-    held(grip, [True, True], 0.5, 0.0)
-    gone = np.array(held(grip, [False, True], PATIENCE + LET_GO + 0.2, 0.5))
+    limb_release = LimbRelease(2)
+    held(limb_release, [True, True], 0.5, 0.0)
+    gone = np.array(held(limb_release, [False, True], PATIENCE + LET_GO + 0.2, 0.5))
     assert (gone[:, 1] == HARD).all(), "the other limb is not concerned"
     soft = gone[np.isfinite(gone[:, 0]), 0]
     assert (np.diff(soft) <= 0.0).all()
     assert soft[0] > 0.3 * FIRMEST
     assert soft[-1] == pytest.approx(LOOSEST)
     assert (soft[:-1] / soft[1:]).max() < 2.1
-    back = np.array(held(grip, [True, True], TAKE_HOLD + 0.1, 0.5 + len(gone) / 60.0))[:, 0]
+    back = np.array(held(limb_release, [True, True], TAKE_HOLD + 0.1, 0.5 + len(gone) / 60.0))[:, 0]
     assert (np.diff(back[np.isfinite(back)]) >= 0.0).all()
     assert back[-1] == HARD
 

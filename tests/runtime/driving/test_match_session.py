@@ -21,6 +21,7 @@ from tests.runtime.stick_figures import (
     frame,
     make_figure,
     pose,
+    seen,
     waving,
 )
 
@@ -34,7 +35,7 @@ def puppet() -> Puppet:
 
 
 class Rehearsal:
-    """A performer, a puppet at rest and a director, fed with poses at a tenth of a second."""
+    """A performer, a puppet at rest and a match session, fed with poses at a tenth of a second."""
 
     def __init__(
         self,
@@ -69,10 +70,6 @@ class Rehearsal:
         """How far the puppet goes from rest when the performer does this [m]."""
         self.puppet.follow(self.performer.follow(frame(positions, self.time)))
         return float(np.abs(self.puppet.deform().vertices - FIGURE.vertices).max())
-
-
-def seen(positions: np.ndarray) -> Pose:
-    return Performer(BODY).follow(frame(positions))
 
 
 def test_without_patience_the_first_pose_performs_at_once(puppet: Puppet) -> None:

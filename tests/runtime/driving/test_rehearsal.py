@@ -31,7 +31,7 @@ def puppet() -> Puppet:
     return Puppet(FIGURE)
 
 
-def director_of(puppet: Puppet, source: str = "whole") -> MatchSession:
+def session_of(puppet: Puppet, source: str = "whole") -> MatchSession:
     puppet.rest()
     hand = Mapping(ARMS)
     return MatchSession(Performer(BODY, source), [puppet], lambda: FRONT_VIEW, Choices(), [hand])
@@ -47,7 +47,7 @@ def test_the_first_the_last_and_those_between_are_looked_at(puppet: Puppet, coun
     for best in {0, count - 1}:
         poses = [pose(BENT)] * count
         poses[best] = pose(T_POSE)
-        match_session = director_of(puppet)
+        match_session = session_of(puppet)
         filled = rehearse(record(poses), "whole", match_session)
         assert filled is not None
         assert filled.shape == (1, 2, 3)
@@ -57,7 +57,7 @@ def test_the_first_the_last_and_those_between_are_looked_at(puppet: Puppet, coun
 
 def test_what_is_filled_holds_the_poses_of_the_recording(puppet: Puppet) -> None:
     raised = {"ShoulderLeft": (0.0, 0.0, 1.9)}
-    match_session = director_of(puppet)
+    match_session = session_of(puppet)
     low, high = rehearse(record([pose(T_POSE)] * 4 + [pose(raised)] * 4), "whole", match_session)[0]
     rest = FIGURE.vertices
     assert high[1] > rest[:, 1].max() + 0.1, "the raised arm is above the head"
@@ -66,9 +66,9 @@ def test_what_is_filled_holds_the_poses_of_the_recording(puppet: Puppet) -> None
 
 
 def test_only_the_lead_is_looked_at(puppet: Puppet) -> None:
-    """A bystander strikes the better pose."""
+    """The second performer strikes the better pose."""
     poses = [pose(BENT), pose(T_POSE)] * 6
-    match_session = director_of(puppet)
+    match_session = session_of(puppet)
     rehearse(record(poses, performers=[3, 1] * 6), "whole", match_session)
     assert moves(puppet, pose(BENT)) < 1e-9
     assert moves(puppet, pose(T_POSE)) > 0.1
@@ -77,7 +77,7 @@ def test_only_the_lead_is_looked_at(puppet: Puppet) -> None:
 def test_poses_of_which_too_little_is_seen_are_left_out(puppet: Puppet) -> None:
     hidden = pose(T_POSE)
     hidden[:] = np.nan
-    match_session = director_of(puppet)
+    match_session = session_of(puppet)
     assert rehearse(record([hidden] * 5), "whole", match_session) is None
     assert match_session.matching, "it matches as it would live"
     assert match_session.mappings[0].drives == ()

@@ -22,6 +22,7 @@ from tests.runtime.stick_figures import (
     make_figure,
     node,
     pose,
+    seen,
     waving,
 )
 
@@ -30,10 +31,6 @@ FIGURE = make_figure()
 HEAD = Drive(
     tuple(map(BODY.index, ("SpineShoulder", "Neck", "Head"))), tuple(map(node, ("chest", "head")))
 )
-
-
-def seen(positions: np.ndarray) -> Pose:
-    return Performer(BODY).follow(frame(positions))
 
 
 def driven(character: Character, drives: Sequence[Drive]) -> tuple[Puppet, PolylineDriver]:

@@ -253,7 +253,7 @@ def test_what_a_slow_loop_skips_is_counted_and_recorded(puppet: Puppet) -> None:
 
 
 def two_performers(count: int) -> Recording:
-    """A lead who waves and a bystander who stands, frame by frame in turn."""
+    """A performer who waves and a second one who stands, frame by frame in turn."""
     poses = [still for moving in waving(count) for still in (moving, pose())]
     return record(poses, rate=20.0, performers=[4, 9] * count)
 
@@ -265,8 +265,8 @@ def test_a_bystanders_frames_are_counted_and_move_nothing(puppet: Puppet) -> Non
     loop = loop_of(player, [puppet], [[kept]], report=report, recorder=tape)
     assert play(loop, player) == len(recording)
     assert [frame.performer for frame in tape.frames] == [4, 9] * 5
-    for lead, bystander in zip(kept.frames[::2], kept.frames[1::2], strict=True):
-        np.testing.assert_array_equal(lead.nodes.positions, bystander.nodes.positions)
+    for first, second in zip(kept.frames[::2], kept.frames[1::2], strict=True):
+        np.testing.assert_array_equal(first.nodes.positions, second.nodes.positions)
     assert kept.frames[4].nodes.positions[:, 1].max() > kept.frames[0].nodes.positions[:, 1].max()
 
     now = [0.0]
@@ -384,7 +384,7 @@ def test_a_frozen_loop_publishes_every_frame_with_the_characters_as_they_were(
 
 
 def test_each_performer_drives_a_character_of_their_own(puppet: Puppet) -> None:
-    """The first waves, the second stands; then the bystander's character is the one that rests."""
+    """The first waves, the second stands; each has a character."""
     other = Puppet(make_figure())
     player, kept = Player(two_performers(5), EveryFrame()), [[Kept()], [Kept()]]
     hands = [Mapping(ARMS)]

@@ -1,4 +1,4 @@
-"""The house: who stands where, what the camera sees, and the chains that light up."""
+"""The scene: who stands where, what the camera sees, and the chains that light up."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ from tests.runtime.stick_figures import (
     frame,
     make_figure,
     pose,
+    seen,
 )
 
 SIZE = (96, 54)
@@ -36,17 +37,13 @@ def puppets() -> list[Puppet]:
 
 
 @pytest.fixture
-def theatres(context: moderngl.Context) -> Iterator[list[Scene]]:
-    """Where a test puts the theatres that it opens."""
+def scenes(context: moderngl.Context) -> Iterator[list[Scene]]:
+    """Where a test puts the scenes that it opens."""
     opened: list[Scene] = []
     yield opened
     for scene in opened:
         scene.close()
     assert context.error == "GL_NO_ERROR"
-
-
-def seen(positions: np.ndarray) -> Pose:
-    return Performer(BODY).follow(frame(positions))
 
 
 def rested(puppets: Sequence[Puppet]) -> list[Motion]:
@@ -69,29 +66,29 @@ def reach(camera: Camera, boxes: np.ndarray, aspect: float) -> np.ndarray:
 
 
 def test_those_on_stage_stand_side_by_side(
-    context: moderngl.Context, puppets: list[Puppet], theatres: list[Scene]
+    context: moderngl.Context, puppets: list[Puppet], scenes: list[Scene]
 ) -> None:
     row = [puppets[0], puppets[1], puppets[0]]
-    theatres.append(Scene(context, SIZE, row, BODY))
-    boxes = theatres[0].stage.boxes
+    scenes.append(Scene(context, SIZE, row, BODY))
+    boxes = scenes[0].stage.boxes
     gaps = boxes[1:, 0, 0] - boxes[:-1, 1, 0]
     np.testing.assert_allclose(gaps, GAP, atol=1e-6)
     assert boxes[0, 0, 0] == pytest.approx(-boxes[-1, 1, 0]), "the row is in the middle"
-    theatres.append(Scene(context, SIZE, puppets[:1], BODY))
+    scenes.append(Scene(context, SIZE, puppets[:1], BODY))
     vertices = puppets[0].character.vertices
     alone = [vertices.min(axis=0), vertices.max(axis=0)]
-    np.testing.assert_allclose(theatres[1].stage.boxes[0], alone, atol=1e-6)
+    np.testing.assert_allclose(scenes[1].stage.boxes[0], alone, atol=1e-6)
 
 
 @pytest.mark.parametrize("size", [SIZE, (40, 90)])
 def test_the_camera_sees_everybody_with_room_to_move(
     context: moderngl.Context,
     puppets: list[Puppet],
-    theatres: list[Scene],
+    scenes: list[Scene],
     size: tuple[int, int],
 ) -> None:
-    theatres.append(Scene(context, size, puppets, BODY))
-    scene = theatres[0]
+    scenes.append(Scene(context, size, puppets, BODY))
+    scene = scenes[0]
     shares = reach(scene.camera, scene.stage.boxes, scene.stage.aspect)
     assert shares.max() < 0.8
     assert shares[:, 0].max() > 0.5 or shares[:, 1].max() > 0.5, "and not from afar"
@@ -101,11 +98,11 @@ def test_the_camera_sees_everybody_with_room_to_move(
 def test_the_camera_sees_all_that_is_filled_in_the_show(
     context: moderngl.Context,
     puppets: list[Puppet],
-    theatres: list[Scene],
+    scenes: list[Scene],
     size: tuple[int, int],
 ) -> None:
-    theatres.append(Scene(context, size, puppets, BODY))
-    scene = theatres[0]
+    scenes.append(Scene(context, size, puppets, BODY))
+    scene = scenes[0]
     filled = np.array([[[-1.0, 0.0, -0.5], [1.0, 4.0, 0.5]], [[-3.0, 0.0, -2.0], [2.0, 1.0, 2.5]]])
     scene.frame_all(filled)
     places = np.array([character.position for character in scene._characters])
@@ -123,10 +120,10 @@ def test_the_camera_sees_all_that_is_filled_in_the_show(
 
 
 def test_framing_does_not_move_who_is_framed(
-    context: moderngl.Context, puppets: list[Puppet], theatres: list[Scene]
+    context: moderngl.Context, puppets: list[Puppet], scenes: list[Scene]
 ) -> None:
-    theatres.append(Scene(context, SIZE, puppets, BODY))
-    scene = theatres[0]
+    scenes.append(Scene(context, SIZE, puppets, BODY))
+    scene = scenes[0]
     before, camera = scene.stage.boxes.copy(), scene.camera
     for _ in range(3):
         scene.frame_all()
@@ -146,12 +143,12 @@ def differ(one: np.ndarray, two: np.ndarray) -> int:
 
 
 def test_matched_chains_light_up_unless_they_are_hidden(
-    context: moderngl.Context, puppets: list[Puppet], theatres: list[Scene]
+    context: moderngl.Context, puppets: list[Puppet], scenes: list[Scene]
 ) -> None:
     one = puppets[:1]
     rested(one)
-    theatres.append(Scene(context, SIZE, one, BODY))
-    scene = theatres[0]
+    scenes.append(Scene(context, SIZE, one, BODY))
+    scene = scenes[0]
     assert scene.highlights
     lit = picture(scene, one, None)
     scene.highlights = False
@@ -164,27 +161,27 @@ def test_matched_chains_light_up_unless_they_are_hidden(
 
 
 def test_what_is_uploaded_needs_no_chains_and_is_drawn_with_them(
-    context: moderngl.Context, puppets: list[Puppet], theatres: list[Scene]
+    context: moderngl.Context, puppets: list[Puppet], scenes: list[Scene]
 ) -> None:
     one = puppets[:1]
     motions = rested(one)
-    theatres.append(Scene(context, SIZE, one, BODY))
-    character = theatres[0]._characters[0]
-    theatres[0].upload(motions)
+    scenes.append(Scene(context, SIZE, one, BODY))
+    character = scenes[0]._characters[0]
+    scenes[0].upload(motions)
     assert len(character.tubes) == 0, "what the vertices do not need is left for the drawing"
-    theatres[0].draw(None)
+    scenes[0].draw(None)
     lit = [each.points for each in one[0].highlights]
     assert len(lit) == len(ARMS)
     assert len(character.tubes) == 2 * sum(len(chain) - 1 for chain in lit) + sum(map(len, lit))
 
 
 def test_the_mirror_shows_the_performer(
-    context: moderngl.Context, puppets: list[Puppet], theatres: list[Scene]
+    context: moderngl.Context, puppets: list[Puppet], scenes: list[Scene]
 ) -> None:
     one = puppets[:1]
     rested(one)
-    theatres.append(Scene(context, SIZE, one, BODY))
-    scene = theatres[0]
+    scenes.append(Scene(context, SIZE, one, BODY))
+    scene = scenes[0]
     without = picture(scene, one, None)
     standing = picture(scene, one, seen(pose()))
     level = picture(scene, one, seen(pose(T_POSE)))
@@ -195,11 +192,11 @@ def test_the_mirror_shows_the_performer(
 
 
 def test_who_moves_is_seen_moving(
-    context: moderngl.Context, puppets: list[Puppet], theatres: list[Scene]
+    context: moderngl.Context, puppets: list[Puppet], scenes: list[Scene]
 ) -> None:
     rested(puppets)
-    theatres.append(Scene(context, SIZE, puppets, BODY))
-    scene = theatres[0]
+    scenes.append(Scene(context, SIZE, puppets, BODY))
+    scene = scenes[0]
     scene.highlights = False
     still = picture(scene, puppets, None)
     puppets[1].follow(seen(pose({"ShoulderRight": (0.0, 0.0, -1.4)})))
@@ -212,36 +209,36 @@ def test_who_moves_is_seen_moving(
 
 
 def test_a_plain_picture_has_neither_mirror_nor_chains(
-    context: moderngl.Context, puppets: list[Puppet], theatres: list[Scene]
+    context: moderngl.Context, puppets: list[Puppet], scenes: list[Scene]
 ) -> None:
     one = puppets[:1]
     rested(one)
-    theatres.append(Scene(context, SIZE, one, BODY, plain=True))
-    theatres.append(Scene(context, SIZE, one, BODY))
-    plain = picture(theatres[0], one, seen(pose()))
-    np.testing.assert_array_equal(plain, picture(theatres[0], one, None))
-    theatres[1].highlights = False
-    np.testing.assert_array_equal(plain, picture(theatres[1], one, None))
+    scenes.append(Scene(context, SIZE, one, BODY, plain=True))
+    scenes.append(Scene(context, SIZE, one, BODY))
+    plain = picture(scenes[0], one, seen(pose()))
+    np.testing.assert_array_equal(plain, picture(scenes[0], one, None))
+    scenes[1].highlights = False
+    np.testing.assert_array_equal(plain, picture(scenes[1], one, None))
 
 
 def test_a_transparent_stage_shows_the_character_alone(
-    context: moderngl.Context, puppets: list[Puppet], theatres: list[Scene]
+    context: moderngl.Context, puppets: list[Puppet], scenes: list[Scene]
 ) -> None:
     one = puppets[:1]
     rested(one)
-    theatres.append(Scene(context, SIZE, one, BODY, background=NOTHING))
-    shown = picture(theatres[0], one, seen(pose()))
+    scenes.append(Scene(context, SIZE, one, BODY, background=NOTHING))
+    shown = picture(scenes[0], one, seen(pose()))
     assert shown[0, 0, 3] == shown[-1, -1, 3] == 0
     assert 0.02 < (shown[..., 3] > 128).mean() < 0.6
 
 
 def test_a_blackout_fades_all_to_black_and_back(
-    context: moderngl.Context, puppets: list[Puppet], theatres: list[Scene]
+    context: moderngl.Context, puppets: list[Puppet], scenes: list[Scene]
 ) -> None:
     one, now = puppets[:1], [10.0]
     rested(one)
     scene = Scene(context, SIZE, one, BODY, clock=lambda: now[0])
-    theatres.append(scene)
+    scenes.append(scene)
     light = picture(scene, one, seen(pose()))[..., :3].astype(int)
     scene.blackout.to(1.0)
     levels = []
@@ -256,12 +253,12 @@ def test_a_blackout_fades_all_to_black_and_back(
 
 
 def test_any_performer_fits_into_the_mirror(
-    context: moderngl.Context, puppets: list[Puppet], theatres: list[Scene]
+    context: moderngl.Context, puppets: list[Puppet], scenes: list[Scene]
 ) -> None:
     one = puppets[:1]
     rested(one)
     one[0].driver.show(Mapping(()), FRONT_VIEW)
     lone = Skeleton(("only",), np.array([-1]), np.zeros((1, 3)))
-    theatres.append(Scene(context, SIZE, one, lone))
+    scenes.append(Scene(context, SIZE, one, lone))
     moment = Performer(lone).follow(frame(np.array([[0.0, 1.0, 0.0]])))
-    assert picture(theatres[0], one, moment).shape == (54, 96, 4)
+    assert picture(scenes[0], one, moment).shape == (54, 96, 4)
