@@ -65,8 +65,8 @@ def _egl() -> str:
     devices = egl_devices()
     if not devices:
         raise InputError("EGL has no device; install a graphics driver or libgl1-mesa-dri")
-    told = [f"{one.vendor} {one.version}" if one.vendor else "closed to us" for one in devices]
-    return f"{len(devices)} device{'s' * (len(devices) != 1)}: {', '.join(told)}"
+    names = [f"{one.vendor} {one.version}" if one.vendor else "no access" for one in devices]
+    return f"{len(devices)} device{'s' * (len(devices) != 1)}: {', '.join(names)}"
 
 
 def _headless() -> str:
@@ -113,11 +113,13 @@ def _ports(name: str) -> str:
     taken = [port for port in listening_ports() if not _is_free(port)]
     if not taken:
         return f"ok       {name:<12} {', '.join(map(str, listening_ports()))} are free"
-    told = []
+    owners = []
     for port in taken:
         owner = port_owner(port)
-        told.append(f"{port} by {f'{owner.name} (process {owner.process})' if owner else 'others'}")
-    return f"taken    {name:<12} {', '.join(told)}: close it, or give the device another port"
+        owners.append(
+            f"{port} by {f'{owner.name} (process {owner.process})' if owner else 'others'}"
+        )
+    return f"taken    {name:<12} {', '.join(owners)}: close it, or give the device another port"
 
 
 def _is_free(port: int) -> bool:

@@ -56,13 +56,12 @@ class OpenedShow:
     Args:
         stream, characters, settings, outputs, context, make_scene, make_driver, clock,
             warn: as of `Show`.
-        closing: closes what was opened, also where this fails half-way.
+        closing: closes what was opened, also if the constructor fails.
 
     Attributes:
         loop: performs the frames.
         scene: draws them, or None where nothing is drawn.
-        make_current: makes the OpenGL context of the scene current on this thread.
-        controls: what actions act upon.
+        controls: the parts of the show that actions change.
         window_controls: the window's keys and mouse, or None without a window.
         remote: the remote control, or None.
         report: the figures of the show.

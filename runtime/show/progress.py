@@ -1,4 +1,4 @@
-"""How far a long work has come, told on the terminal and nowhere else."""
+"""The progress of a long work: a bar on a terminal, a few lines in a log."""
 
 from __future__ import annotations
 

@@ -55,7 +55,7 @@ class CharacterSettings:
 
 @dataclass(frozen=True, slots=True)
 class MatchSettings:
-    """Who drives what.
+    """How performers are matched to characters.
 
     Attributes:
         source: the part of the performer that drives: a preset such as "whole" or "left-arm", or
@@ -180,7 +180,7 @@ class ShowSettings:
         background: a plain colour, or `runtime.render.background.NOTHING`, in place of the stage.
         plain: leave out the matched chains and the performer inset.
         fps: pictures a second of videos, cameras and senders, at most.
-        match: who drives what.
+        match: how performers are matched to characters.
         characters: how the characters deform: one for each, or one for all.
         conditioning: steps of the conditioning to switch on or off, by the names of
             `runtime.conditioning.switches.Conditioning`; the others stay as is usual for a live

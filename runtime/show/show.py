@@ -1,4 +1,4 @@
-"""A show: a stream of skeleton frames drives characters, in a window, without one, or as a library.
+"""A show: the frames of a stream drive characters, in a window or without one.
 
 The command line, the doctor, the benchmarks and the tests all build their shows here.
 """
@@ -44,27 +44,29 @@ class Show:
 
     Args:
         stream: where the frames come from; it is closed with the show, and when this fails.
-        characters: who is on stage, from left to right.
+        characters: the characters on stage, from left to right.
         settings: everything else; the defaults perform without a window, a picture or a file.
-        pace: waits between the ticks of `run`; chosen by the stream if None.
+        pace: waits between the ticks of `run`; if None, the one that suits the stream.
         outputs: outputs of your own that take each frame of the first character.
         context: an OpenGL 3.3 context of your own, in which every tick draws; the show makes it
             current and does not release it. If None, a show that needs pictures makes one.
-        make_scene: makes the scene; called as `Scene` is.
+        make_scene: makes the scene, with the arguments of `Scene`.
         make_driver: makes the driver of each puppet; if None, the settings name it.
         clock: host monotonic time [s].
-        warn: takes one line on a fault that does not end the show; standard error if None.
+        warn: takes one line about a fault that does not end the show; if None, the line goes to
+            standard error.
 
     Attributes:
         settings: as given.
-        controls: what actions act upon: ``ACTIONS["accept"].press(show.controls)`` of
-            `runtime.control.actions`, with the loop, the takes and the scene.
+        controls: the parts of the show that actions change, such as the loop, the takes and the
+            scene; ``ACTIONS["accept"].press(show.controls)`` of `runtime.control.actions` accepts
+            the match.
         acts: each performer with their puppets and their match session.
         puppets: the characters as they are driven.
 
     Raises:
         InputError: a file or device cannot be opened, or settings do not fit the characters or the
-            performer; what was opened until then is closed.
+            performer. Everything opened until then is closed.
     """
 
     def __init__(
@@ -111,9 +113,9 @@ class Show:
     # -- Performing --------------------------------------------------------------------------------
 
     def tick(self) -> bool:
-        """Perform the newest frame that has come since the last tick; never waits for one.
+        """Perform the newest frame that has come since the last tick, without waiting for one.
 
-        A tick also draws the window and does what its keys and the remote control ask for.
+        A tick also draws the window and handles its keys and the remote control.
 
         Returns:
             Whether a frame had come.
