@@ -1,4 +1,4 @@
-"""Unit quaternions (x, y, z, w) inside compiled loops, as tuples that stay in registers."""
+"""Operations on unit quaternions (x, y, z, w) in kernels, as tuples that stay in registers."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ Quaternion = tuple[float, float, float, float]
 
 @kernel
 def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
-    """The rotation `b` followed by `a`."""
+    """Return the rotation `b` followed by `a`."""
     ax, ay, az, aw = a
     bx, by, bz, bw = b
     return (
@@ -25,13 +25,13 @@ def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
 
 @kernel
 def conjugate(q: Quaternion) -> Quaternion:
-    """The inverse rotation."""
+    """Return the inverse rotation."""
     return (-q[0], -q[1], -q[2], q[3])
 
 
 @kernel
 def rotate(q: Quaternion, v: Vector) -> Vector:
-    """The vector `v` turned by `q`."""
+    """Return the vector `v`, rotated by `q`."""
     x, y, z, w = q
     tx = 2.0 * (y * v[2] - z * v[1])
     ty = 2.0 * (z * v[0] - x * v[2])
@@ -45,7 +45,7 @@ def rotate(q: Quaternion, v: Vector) -> Vector:
 
 @kernel
 def normalized(q: Quaternion) -> Quaternion:
-    """`q` at unit length; the identity where it has none."""
+    """Return `q` scaled to unit length, or the identity if its length is zero."""
     norm = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3])
     if norm < 1e-300:
         return (0.0, 0.0, 0.0, 1.0)
@@ -54,7 +54,7 @@ def normalized(q: Quaternion) -> Quaternion:
 
 @kernel
 def between(a: Vector, b: Vector, axis: Vector) -> Quaternion:
-    """The smallest rotation that takes the unit vector `a` to `b`; about `axis` if they oppose."""
+    """Return the smallest rotation from unit vector `a` to `b`, about `axis` if they oppose."""
     w = 1.0 + a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
     if w > 1e-12:
         x = a[1] * b[2] - a[2] * b[1]
@@ -63,14 +63,14 @@ def between(a: Vector, b: Vector, axis: Vector) -> Quaternion:
         return normalized((x, y, z, w))
     along = axis[0] * a[0] + axis[1] * a[1] + axis[2] * a[2]
     x, y, z = axis[0] - along * a[0], axis[1] - along * a[1], axis[2] - along * a[2]
-    if x * x + y * y + z * z < 1e-12:  # the axis lies along the vector: any other will do
+    if x * x + y * y + z * z < 1e-12:  # the axis lies along the vector: take any other
         x, y, z = (0.0, -a[2], a[1]) if abs(a[0]) < 0.9 else (-a[2], 0.0, a[0])
     return normalized((x, y, z, 0.0))
 
 
 @kernel
 def power(q: Quaternion, t: float) -> Quaternion:
-    """The share `t` of the turn `q`, the way its sign says: over 180 degrees where w < 0."""
+    """Return the share `t` of the rotation `q`, which is over 180 degrees where w < 0."""
     sine = math.sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2])
     if sine < 1e-12:
         return (0.0, 0.0, 0.0, 1.0)
@@ -81,7 +81,7 @@ def power(q: Quaternion, t: float) -> Quaternion:
 
 @kernel
 def matrix(q: Quaternion) -> tuple[Vector, Vector, Vector]:
-    """The rows of the unit quaternion's rotation matrix."""
+    """Return the rows of the rotation matrix of a unit quaternion."""
     x, y, z, w = q
     return (
         (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)),

@@ -1,8 +1,10 @@
-"""An elimination order that keeps a surface's sparse factor small and its solve parallel.
+"""Nested dissection: an elimination order that keeps a sparse factor small and its solve parallel.
 
-Nested dissection (George 1973, Nested dissection of a regular finite element mesh): a small set of
-vertices separates a mesh into two halves, which are ordered first, each in the same way; the
-separator comes last. The halves do not see each other, so they can be eliminated at the same time.
+A small set of vertices, the separator, splits a mesh into two halves. The halves are ordered first,
+each in the same way; the separator comes last. The halves do not touch each other, so they can be
+eliminated at the same time.
+
+Source: George 1973, Nested dissection of a regular finite element mesh.
 """
 
 from __future__ import annotations
@@ -22,7 +24,7 @@ LEAF = 32  # parts of at most this many vertices are eliminated as one dense blo
 
 
 class Graph(NamedTuple):
-    """A symmetric graph as compressed rows, and where its n vertices lie, (n, 3)."""
+    """A symmetric graph as compressed rows, and the positions (n, 3) of its vertices."""
 
     starts: Indices
     neighbours: Indices
@@ -30,10 +32,10 @@ class Graph(NamedTuple):
 
 
 class Workspace(NamedTuple):
-    """What a cut works on.
+    """Scratch memory of a cut.
 
-    By vertex: the part that owns it, its side (0 or 1, or 2 for the separator) and its distance
-    along edges; by place in the part: the keys to cut at, and a queue.
+    For each vertex: the part that owns it, its side (0 or 1, or 2 for the separator) and its
+    distance along edges. For each place in the part: the key to cut at, and a queue.
     """
 
     owner: Indices
@@ -46,8 +48,9 @@ class Workspace(NamedTuple):
 class Dissection(NamedTuple):
     """An order of n vertices and its tree of K blocks, children before parents.
 
-    Vertex order[k] is eliminated k-th. Block b holds the places firsts[b] to firsts[b + 1] and has
-    the parent parents[b], or -1; a block touches only its own, its descendants' and its ancestors'.
+    Vertex order[k] is eliminated k-th. Block b has the places firsts[b] to firsts[b + 1] and the
+    parent parents[b], or -1. A block touches only its own unknowns and those of its descendants and
+    ancestors.
     """
 
     order: Indices
@@ -58,7 +61,7 @@ class Dissection(NamedTuple):
 def dissect(graph: sp.csr_matrix, points: Floats) -> Dissection:
     """Order the vertices of a symmetric graph (n, n) that lie at points (n, 3).
 
-    The points only suggest where to cut; any graph gets a valid order.
+    The points only guide the cuts; any graph gets a valid order.
     """
     count = graph.shape[0]
     rows = Graph(
@@ -80,7 +83,7 @@ def dissect(graph: sp.csr_matrix, points: Floats) -> Dissection:
 
 @kernel
 def _dissect(graph: Graph) -> tuple[Indices, Indices, Indices, Indices]:
-    """The order, and each block's size, end and parent, parents before children."""
+    """Return the order, and the size, end and parent of each block, parents before children."""
     count = len(graph.points)
     order = np.arange(count).astype(np.int32)
     workspace = Workspace(
@@ -123,7 +126,7 @@ def _dissect(graph: Graph) -> tuple[Indices, Indices, Indices, Indices]:
 
 @kernel
 def _split(part: Indices, side: NDArray[np.int8]) -> tuple[int, int]:
-    """Sort a part by side, 0, 1, then the separator 2; the sizes of the first two."""
+    """Sort a part by side: 0, 1, then the separator 2; return the sizes of the first two."""
     old = part.copy()
     filled = 0
     sizes = np.zeros(3, np.int64)
@@ -138,10 +141,10 @@ def _split(part: Indices, side: NDArray[np.int8]) -> tuple[int, int]:
 
 @kernel
 def _cut(graph: Graph, part: Indices, block: np.int64, workspace: Workspace) -> None:
-    """Give each vertex of a part its side, by the best of four cuts at the median of a key.
+    """Assign a side to each vertex of a part: the best of four cuts, each at the median of a key.
 
-    The keys are the three coordinates and the difference of the distances along edges to two far
-    ends, which follows a limb around its bends.
+    The keys are the three coordinates, and the difference of the distances along edges to two far
+    ends. The last key follows a limb around its bends.
     """
     side, keys = workspace.side, workspace.keys
     best = len(part) + 1
@@ -156,7 +159,7 @@ def _cut(graph: Graph, part: Indices, block: np.int64, workspace: Workspace) -> 
         below = 0
         for k in range(len(part)):
             below += keys[k] < middle
-        # Ties at the middle are dealt out so that both halves get their share.
+        # Vertices whose key is the median are shared out so that both halves have the same size.
         wanted = len(part) // 2 - below
         for k in range(len(part)):
             is_left = keys[k] < middle
@@ -175,7 +178,7 @@ def _cut(graph: Graph, part: Indices, block: np.int64, workspace: Workspace) -> 
 
 @kernel
 def _median(values: Floats) -> float:
-    """The value at len // 2 in ascending order; numba's own partition compiles for seconds.
+    """Return the value at len // 2 in ascending order; numba's own partition compiles for seconds.
 
     Source: Hoare 1961, Algorithm 65: Find.
     """
@@ -206,7 +209,7 @@ def _median(values: Floats) -> float:
 
 @kernel
 def _separate(graph: Graph, part: Indices, block: np.int64, workspace: Workspace) -> int:
-    """Turn the smaller rim of the cut between sides 0 and 1 into the separator; its size."""
+    """Make the smaller rim of the cut between sides 0 and 1 the separator; return its size."""
     starts, neighbours, owner, side = (
         graph.starts,
         graph.neighbours,
@@ -233,7 +236,7 @@ def _separate(graph: Graph, part: Indices, block: np.int64, workspace: Workspace
 
 @kernel
 def _far_ends(graph: Graph, part: Indices, block: np.int64, workspace: Workspace) -> None:
-    """Keys that grow from one end of a part to the other, counted along its edges."""
+    """Compute keys that grow from one end of a part to the other, counted along its edges."""
     starts, neighbours, owner = graph.starts, graph.neighbours, workspace.owner
     distance, queue, keys = workspace.distance, workspace.queue, workspace.keys
     far = part[0]

@@ -1,8 +1,8 @@
-"""Dense matrices laid out so that three row vectors times one run at the processor's full speed.
+"""Dense matrices in panels, a layout for the product of three row vectors and a matrix.
 
-A matrix is cut into panels of WIDE columns, the last one of NARROW where that is enough; within a
-panel, row follows row. Three vectors times a panel are three sums of its rows, which stay in three
-registers from the first row to the last.
+A matrix is cut into panels of WIDE columns, the last one of NARROW where that is enough. Within a
+panel, row follows row. Three vectors times a panel are three sums of its rows. The sums stay in
+registers from the first row to the last, and memory is read in order.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ WIDE, NARROW = 16, 8  # single precision numbers in a register of AVX-512, and o
 
 
 def panels_size(rows: Offsets, columns: Offsets) -> Offsets:
-    """How many numbers the panels of matrices (rows, columns) take."""
+    """The number of numbers in the panels of matrices (rows, columns)."""
     return rows * (-(-columns // NARROW) * NARROW)
 
 
 @kernel
 def lay_panels(matrix: Floats, panels: Singles) -> None:
-    """Copy a matrix into panels that are zero."""
+    """Copy a matrix into its panels, which are zero before."""
     rows, columns = matrix.shape
     at = 0
     for low in range(0, columns, WIDE):
@@ -42,7 +42,7 @@ def lay_panels(matrix: Floats, panels: Singles) -> None:
 
 
 def _product(width: int) -> Callable[..., None]:
-    """Make the product of three vectors with one panel of so many columns."""
+    """Make the kernel that multiplies three vectors by one panel of `width` columns."""
 
     @kernel
     def product(  # noqa: PLR0917
@@ -84,10 +84,10 @@ def multiply(  # noqa: PLR0917
     end: int,
     sums: Singles,
 ) -> None:
-    """Three vectors times the matrix of so many columns whose panels start at panels[at].
+    """Multiply three vectors by the matrix with `columns` columns whose panels start at panels[at].
 
-    The vectors are the rows of `vectors` (n, 3) named by picked[begin:end]; `sums` (3, s), with
-    room for whole panels, becomes their products. All arrays but `picked` are of one type.
+    The vectors are the rows picked[begin:end] of `vectors` (n, 3). `sums` (3, s), which has room
+    for whole panels, becomes the products. All arrays except `picked` have one number type.
     """
     rows = end - begin
     for low in range(0, columns, WIDE):
