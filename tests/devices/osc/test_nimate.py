@@ -1,9 +1,8 @@
-"""NI mate and its kin as they write their joints: told apart, upright, nothing evaluated."""
+"""NI mate's joints: whole frames, users and numbers, lost joints, and hostile messages."""
 
 from __future__ import annotations
 
 import socket
-from collections.abc import Callable, Sequence
 
 import numpy as np
 import pytest
@@ -14,75 +13,24 @@ from scipy.spatial.transform import Rotation
 from devices.bodies.source_joints import available_presets
 from devices.errors import InputError
 from devices.kinect.joints import KINECT_V2
-from devices.osc.nimate import FORMATS, INFERRED, MOST_USERS, NimateDecoder
-from devices.osc.openni_joints import OPENNI, joint_called
+from devices.osc.nimate import INFERRED, MOST_USERS, NimateDecoder
+from devices.osc.openni_joints import OPENNI
 from devices.skeleton import SkeletonFrame
 from devices.stream import open_stream
 from devices.transport.live_stream import LiveStream
-from tests.devices.sender_packets import (
-    NIMATE,
-    STEP,
-    SYNC,
-    animata,
-    kinect2,
-    nimate,
-    osceleton,
-    posed,
-    skelecaster,
+from tests.devices.osc.nimate_bodies import (
+    FAR,
+    TURNS,
+    WAYS,
+    body,
+    fed,
+    joint,
+    kinect_body,
+    standing,
 )
+from tests.devices.sender_packets import NIMATE, STEP, SYNC, animata, nimate, osceleton, skelecaster
 from tests.devices.vmc_sender import bundle, message
 from tests.waiting import PATIENCE
-
-TORSO = np.linalg.norm(
-    OPENNI.rest_positions[OPENNI.index("Neck")] - OPENNI.rest_positions[OPENNI.index("Pelvis")]
-)
-TURNS = Rotation.from_euler("yx", np.linspace(0.1, 1.0, 32).reshape(16, 2))
-FAR = np.array([0.4, -0.3, -2.5])  # before the sensor, which stands higher than the hips
-
-
-def joint(name: str) -> int:
-    return OPENNI.index(name)
-
-
-def body(k: int = 0) -> np.ndarray:
-    """A pose whose pelvis is the middle of its hips, as the programs that have none leave it."""
-    places = posed(OPENNI, k)
-    places[joint("Pelvis")] = (places[joint("LeftHip")] + places[joint("RightHip")]) / 2.0
-    return places
-
-
-def standing(places: np.ndarray) -> np.ndarray:
-    """On the floor, with the torso of the built-in body."""
-    torso = np.linalg.norm(places[joint("Neck")] - places[joint("Pelvis")])
-    return (places - (0.0, places[:, 1].min(), 0.0)) * TORSO / torso
-
-
-def fed(
-    decoder: NimateDecoder, frames: Sequence[Sequence[OscMessage]], *, bundled: bool = True
-) -> list[SkeletonFrame]:
-    """What a decoder makes of frames that come one after another, 60 a second."""
-    made: list[SkeletonFrame] = []
-    for k, said in enumerate(frames):
-        datagrams = [bundle(said)] if bundled else [one.dgram for one in said]
-        for n, data in enumerate(datagrams):
-            made += decoder.feed(data, 10.0 + k * STEP + n * 1e-5)
-    return made
-
-
-Say = Callable[[np.ndarray], list[OscMessage]]
-WAYS: dict[str, Say] = {
-    "basic": lambda p: nimate(p, what="place"),
-    "basic and orientation": lambda p: nimate(p, TURNS),
-    "with a slash": lambda p: nimate(p, shape="/skeleton_{name}"),
-    "ten units a metre": lambda p: nimate(10.0 * p, what="place"),
-    "millimetres": lambda p: nimate(1000.0 * p, what="place"),
-    "OSCeleton": osceleton,
-    "OSCeleton, mirrored": lambda p: osceleton(p, mirrored=True),
-    "OSCeleton, raw": lambda p: osceleton(p, raw=True),
-    "OSCeleton, for Quartz Composer": lambda p: [
-        message(f"/joint/{one.params[0]}/{one.params[1]}", *one.params[2:]) for one in osceleton(p)
-    ],
-}
 
 
 @pytest.mark.parametrize("way", WAYS)
@@ -209,117 +157,6 @@ def test_no_more_users_than_there_are_places_for() -> None:
     ]
     (performer,) = {frame.performer for frame in frames}
     assert performer < MOST_USERS
-
-
-def test_animata_s_pictures_stand_upright_whichever_way_they_run() -> None:
-    for mirror in (1.0, -1.0):
-        for down in (1.0, -1.0):
-            said = [animata(body(k) * (mirror, down, 0.0), user=3) for k in range(4)]
-            frame = fed(NimateDecoder(), said)[-1]
-            wanted = standing(body(2) * (1.0, 1.0, 0.0))
-            middle = frame.positions[joint("Pelvis")] - wanted[joint("Pelvis")]
-            assert middle[1] == pytest.approx(0.0, abs=5e-3)
-            assert frame.positions - middle == pytest.approx(wanted, abs=5e-3)
-            assert (frame.positions[:, 2] == 0.0).all()
-
-
-def test_omni_is_a_list_without_names() -> None:
-    order = [joint(n) for n in OPENNI.names if n != "Pelvis"]
-    order = [*order[2::-1], *order[3:6], *order[9:12], *order[6:9], *order[12:]]
-    values = [(body(k)[order] + FAR) @ np.diag([-1.0, 1.0, -1.0]) for k in range(4)]
-    frame = fed(NimateDecoder(), [[message("skeleton", *v.ravel().tolist())] for v in values])[-1]
-    assert frame.positions == pytest.approx(standing(body(3) + FAR), abs=2e-3)
-    names = [OPENNI.names[j] for j in order[::-1]]
-    omni = tuple(j for name in names if (j := joint_called(name)) is not None)
-    told = NimateDecoder("nimate", omni=omni)
-    frame = fed(told, [[message("/skeleton", *v[::-1].ravel().tolist())] for v in values])[-1]
-    assert frame.positions == pytest.approx(standing(body(3) + FAR), abs=2e-3)
-    assert NimateDecoder().feed(message("skeleton", *[0.5] * 7).dgram, 1.0) == []
-
-
-def test_a_given_scale_is_believed() -> None:
-    said = [nimate(100.0 * (body(k) + FAR), what="place") for k in range(3)]
-    frame = fed(NimateDecoder(scale=0.01), said)[-1]
-    places = body(2) + FAR
-    wanted = places - (0.0, places[:, 1].min(), 0.0)
-    assert frame.positions == pytest.approx(wanted, abs=2e-3)
-
-
-def kinect_body(k: int = 0) -> np.ndarray:
-    return posed(KINECT_V2, k) + FAR
-
-
-@pytest.mark.parametrize("bundled", [True, False], ids=["bundles", "bare"])
-def test_kinect_s_joints_are_metres(bundled: bool) -> None:
-    said = [kinect2(kinect_body(k)) for k in range(6)]
-    full = fed(NimateDecoder("kinect2"), said, bundled=bundled)
-    lowest = kinect_body()[:, 1].min()
-    assert len(full) >= 5
-    for k, frame in enumerate(full):
-        wanted = kinect_body(k) - (0.0, lowest, 0.0)
-        assert frame.positions == pytest.approx(wanted, abs=1e-5)
-    some = fed(NimateDecoder(), said, bundled=bundled)[-1]
-    last = len(full) - 1
-    for ours, theirs in (("LeftHand", "HandLeft"), ("RightFoot", "AnkleRight")):
-        wanted = kinect_body(last)[KINECT_V2.index(theirs)] - (0.0, lowest, 0.0)
-        assert some.positions[joint(ours)] == pytest.approx(wanted, abs=1e-5)
-
-
-def test_hands_of_kinect_are_no_joints() -> None:
-    decoder = NimateDecoder()
-    assert decoder.feed(message("/bodies/7/hands/Left", "Open", "High").dgram, 1.0) == []
-    assert decoder.refused == 0
-
-
-def test_skelecaster_s_bodies_come_at_once() -> None:
-    decoder = NimateDecoder("skelecaster")
-    one, two = kinect_body(), kinect_body(5) + np.array([1.5, 0.0, 0.0])
-    states = (2, 1, 0, *[2] * 22)
-    frames = decoder.feed(skelecaster({2**63 + 5: one, 17: two}, states), 3.0)
-    assert [frame.performer for frame in frames] == [0, 1]
-    assert frames[0].confidence.tolist() == [1.0, 0.5, 0.0, *[1.0] * 22]
-    assert np.isnan(frames[0].positions[2]).all()
-    lowest = np.delete(one[:, 1], 2).min()
-    assert frames[0].positions[3] == pytest.approx(one[3] - (0.0, lowest, 0.0), abs=1e-5)
-    again = decoder.feed(skelecaster({17: two, 3: one}, states), 3.5)
-    assert [frame.performer for frame in again] == [1, 0]
-    (told,) = NimateDecoder().feed(skelecaster({1: one}), 3.0)
-    assert told.positions.shape == (16, 3)
-    assert NimateDecoder().feed(skelecaster({}), 3.0) == []
-
-
-@pytest.mark.parametrize("data", [skelecaster({1: kinect_body()})[:-1], b"\1\1\2", b"\1\1\2\xff"])
-def test_a_skelecaster_that_is_too_short_is_refused(data: bytes) -> None:
-    decoder = NimateDecoder()
-    assert decoder.feed(data, 1.0) == []
-    assert decoder.refused == 1
-
-
-def test_one_format_hears_only_itself() -> None:
-    told: dict[str, bytes] = {
-        "nimate": bundle(nimate(body() + FAR)),
-        "osceleton": bundle(osceleton(body() + FAR)),
-        "animata": bundle(animata(body())),
-        "kinect2": bundle(kinect2(kinect_body())),
-        "skelecaster": skelecaster({1: kinect_body()}),
-    }
-    assert set(told) == set(FORMATS)
-    for format in FORMATS:
-        for other, data in told.items():
-            decoder = NimateDecoder(format)
-            frames = [f for k in range(3) for f in decoder.feed(data, 1.0 + 0.02 * k)]
-            heard = other == format or (format == "nimate" and other in ("osceleton", "animata"))
-            assert bool(frames) == heard, (format, other)
-
-
-def test_nimate_may_write_as_osceleton_does_in_its_own_axes() -> None:
-    places = body() + FAR
-    said = [
-        message("/joint", name, 1, *(places[joint(ours)] * (-1.0, 1.0, -1.0)).tolist())
-        for ours, name in NIMATE.items()
-    ]
-    frame = fed(NimateDecoder("nimate"), [said] * 3)[-1]
-    assert frame.positions == pytest.approx(standing(places), abs=2e-3)
 
 
 def test_joints_that_are_not_told_are_not_seen() -> None:

@@ -1,9 +1,8 @@
-"""TCP: senders connect to us; streams are cut into messages, and no sender harms another."""
+"""TCP: senders connect to us, and no sender harms another."""
 
 from __future__ import annotations
 
 import os
-import random
 import socket
 import struct
 import sys
@@ -19,31 +18,21 @@ import pytest
 from devices.errors import InputError
 from devices.skeleton import SkeletonFrame
 from devices.stream import open_stream
-from devices.suits.xsens import HEADER, XsensDecoder, datagram_length
+from devices.suits.xsens import XsensDecoder
 from devices.transport.live_stream import LiveStream
 from devices.transport.senders import MOST_SENDERS
 from devices.transport.tcp import LONGEST, Framing, TcpTransport, take_messages
-from tests.devices.sender_packets import XSENS, mxtp01, mxtp02, mxtp13, posed
-from tests.devices.test_mutated_packets import MUTATIONS, damaged, xsens_packets
+from tests.devices.sender_packets import XSENS, mxtp02, mxtp13, posed
+from tests.devices.transport.xsens_stream import (
+    GARBAGE,
+    MXTP,
+    PREFIXED,
+    expected,
+    header,
+    heights,
+    pose,
+)
 from tests.waiting import PATIENCE
-
-MXTP = Framing("MXTP", HEADER.size, datagram_length)
-PREFIXED = Framing("test", 4, lambda head: 4 + struct.unpack(">I", head)[0])
-GARBAGE = b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n"
-
-
-def pose(k: int, who: int = 0) -> bytes:
-    (data,) = mxtp02(posed(XSENS, k), counter=k, time_ms=17 * k, who=who)
-    return data
-
-
-def heights(frames: list[SkeletonFrame]) -> list[float]:
-    """Of the raised hand, which tells a pose from another."""
-    return [float(frame.positions[XSENS.index("LeftHand"), 1]) for frame in frames]
-
-
-def expected(*numbers: int) -> list[float]:
-    return [float(posed(XSENS, k)[XSENS.index("LeftHand"), 1]) for k in numbers]
 
 
 @pytest.fixture
@@ -74,78 +63,6 @@ def closed_by_us(sender: socket.socket) -> bool:
         return sender.recv(1) == b""
     except ConnectionError:
         return True
-
-
-# -- cutting --------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("step", [1, 7, 24, 759, 760, 761, 5000])
-def test_messages_are_the_same_however_the_stream_is_split(step: int) -> None:
-    sent = [pose(0), mxtp13(), mxtp01(posed(XSENS)), pose(1), b"".join(mxtp02(posed(XSENS)[:4]))]
-    stream, data = b"".join(sent), bytearray()
-    cut: list[bytes] = []
-    for start in range(0, len(stream), step):
-        data += stream[start : start + step]
-        messages, sound = take_messages(data, MXTP)
-        assert sound
-        cut += messages
-    assert cut == sent
-    assert data == b""
-
-
-def _header(kind: bytes, count: int, size: int) -> bytes:
-    return struct.pack(">6sIBBIBBBBHH", kind, 1, 0x80, count, 0, 0, 23, 0, 0, 0, size)
-
-
-def test_what_a_header_says_about_the_length() -> None:
-    assert datagram_length(_header(b"MXTP02", 23, 736)) == 760
-    assert datagram_length(_header(b"MXTP02", 23, 0)) == 760  # as old versions leave it
-    assert datagram_length(_header(b"MXTP01", 23, 0)) == 24 + 23 * 28
-    assert datagram_length(_header(b"MXTP02", 0, 0)) == 24
-    assert datagram_length(_header(b"MXTP25", 1, 16)) == 40
-    assert datagram_length(_header(b"MXTP13", 1, 65535)) == 24 + 65535
-
-
-@pytest.mark.parametrize(
-    "head",
-    [
-        _header(b"MXTP02", 23, 735),
-        _header(b"MXTP02", 23, 65535),
-        _header(b"MXTP02", 255, 736),
-        _header(b"MXTP13", 1, 0),
-        _header(b"MXTPxx", 23, 736),
-        _header(b"mxtp02", 23, 736),
-        bytes(24),
-        GARBAGE[:24],
-    ],
-)
-def test_what_is_no_header(head: bytes) -> None:
-    assert datagram_length(head) is None
-    data = bytearray(pose(0) + head + pose(1))
-    assert take_messages(data, MXTP) == ([pose(0)], False)
-
-
-@pytest.mark.parametrize("length", [None, -1, 0, 3, LONGEST + 1, 1 << 60])
-def test_a_length_beyond_belief_is_no_header(length: int | None) -> None:
-    data = bytearray(b"anything")
-    assert take_messages(data, Framing("test", 4, lambda head: length)) == ([], False)
-
-
-def test_damaged_streams_do_no_harm() -> None:
-    chance, packets = random.Random(7), xsens_packets()
-    decoder, data = XsensDecoder(), bytearray()
-    frames = unsound = 0
-    for number in range(MUTATIONS):
-        data += damaged(chance, packets) if chance.random() < 0.1 else chance.choice(packets)
-        messages, sound = take_messages(data, MXTP)
-        for message in messages:
-            frames += len(decoder.feed(message, 100.0 + number / 250))
-        assert not sound or len(data) < HEADER.size + 65535
-        if not sound:
-            unsound += 1
-            data.clear()  # as the next connection begins
-    assert frames > 0
-    assert unsound > 0
 
 
 # -- over a socket --------------------------------------------------------------------------------
@@ -204,8 +121,8 @@ def test_connections_have_decoders_of_their_own(stream: LiveStream) -> None:
         GARBAGE,
         bytes(100),
         b"\xff" * 65536,
-        _header(b"MXTP02", 255, 65535),
-        _header(b"MXTP13", 1, 0),
+        header(b"MXTP02", 255, 65535),
+        header(b"MXTP13", 1, 0),
     ],
 )
 def test_garbage_closes_its_connection_and_no_other(stream: LiveStream, garbage: bytes) -> None:
