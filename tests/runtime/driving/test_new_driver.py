@@ -36,7 +36,7 @@ from runtime.show.loop import FrameLoop
 from runtime.show.scene import Scene
 from solvers.deform.handles import HARD
 from tests.runtime.output.files.test_point_cache import read_pc2
-from tests.runtime.show.test_loop import Kept, Wire
+from tests.runtime.show.loops import Kept, Wire
 from tests.runtime.stick_figures import BODY, FRONT_VIEW, frame, make_figure, record, waving
 
 SIZE = (96, 54)

@@ -18,7 +18,7 @@ from runtime.output.report.report import Report
 from runtime.puppet.puppet import Puppet
 from runtime.show.act_group import Act
 from runtime.show.loop import FrameLoop
-from tests.runtime.show.test_loop import Kept
+from tests.runtime.show.loops import Kept
 from tests.runtime.stick_figures import (
     ARMS,
     BODY,

@@ -26,7 +26,7 @@ from runtime.output.report.report import Report
 from runtime.puppet.puppet import Puppet
 from runtime.show.act_group import Act
 from runtime.show.loop import FrameLoop
-from tests.runtime.show.test_loop import Kept, Wire
+from tests.runtime.show.loops import Kept, Wire
 from tests.runtime.stick_figures import ARMS, BODY, FRONT_VIEW, T_POSE, frame, make_figure, pose
 from tests.waiting import PATIENCE
 

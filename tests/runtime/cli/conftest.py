@@ -1,0 +1,54 @@
+"""Fixtures of the command line: a short recording, the program, a folder to be in."""
+
+from __future__ import annotations
+
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from replay.builtin import builtin_recording
+from replay.mcap.writer import McapWriter
+from tests.runtime.cli.program import (
+    BUNRAKU,
+    ENVIRONMENT,
+    FRAMES,
+    Run,
+)
+from tests.waiting import PATIENCE
+
+
+@pytest.fixture(scope="session")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A native recording of the first frames of the built-in performance."""
+    path = tmp_path_factory.mktemp("recording") / "wave.mcap"
+    played = builtin_recording("wave")
+    with McapWriter(path, played.skeleton) as writer:
+        for index in range(0, 5 * FRAMES, 5):
+            writer.write(played.frame(index))
+    return path
+
+
+@pytest.fixture
+def bunraku(tmp_path: Path) -> Run:
+    """Runs the program in a folder of its own."""
+
+    def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+        return subprocess.run(
+            [*BUNRAKU, *map(str, arguments)],
+            cwd=tmp_path,
+            env=ENVIRONMENT,
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+            check=False,
+        )
+
+    return run
+
+
+@pytest.fixture
+def in_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """An empty folder that this process is in."""
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
