@@ -20,7 +20,6 @@ from runtime.characters.placement import (
     placed,
     placement_matrix,
 )
-from solvers.surface.upright import faces_away, stands_along_z, surface_samples
 
 QUARTER = Rotation.from_euler("y", 90, degrees=True).as_matrix()
 
@@ -84,12 +83,6 @@ def test_a_back_is_turned_from_the_audience() -> None:
     np.testing.assert_array_equal(rotation, ABOUT_FACE @ Z_UP)
 
 
-def test_a_round_thing_has_no_back() -> None:
-    angle = np.linspace(0, 2 * np.pi, 40, endpoint=False)
-    rings = [np.column_stack([np.cos(angle), np.full(40, y), np.sin(angle)]) for y in range(8)]
-    assert not faces_away(np.vstack(rings))
-
-
 @pytest.mark.parametrize("thin", range(3))
 def test_a_sheet_shows_its_face_upright(thin: int) -> None:
     square = np.array([[0.0, 0], [3, 0], [3, 1], [0, 1]])
@@ -101,21 +94,6 @@ def test_a_sheet_shows_its_face_upright(thin: int) -> None:
     assert "flat" in notes[0]
     if thin == 2:  # drawn in xy: as it was drawn
         np.testing.assert_array_equal(rotation, UPRIGHT)
-
-
-@pytest.mark.parametrize(
-    "vertices", [np.zeros((3, 3)), np.eye(3)[[0, 0, 1]], np.eye(3)], ids=["point", "line", "face"]
-)
-def test_the_least_surfaces_have_samples(vertices: np.ndarray) -> None:
-    assert np.isfinite(surface_samples(vertices, np.array([[0, 1, 2]]))).all()
-
-
-def test_a_snake_lies_as_it_lies() -> None:
-    angle = np.linspace(0, 2 * np.pi, 24, endpoint=False)
-    ring = np.column_stack([np.cos(angle), np.sin(angle)])
-    points = np.vstack([np.column_stack([ring, np.full(24, z)]) for z in np.linspace(0, 30, 60)])
-    assert not stands_along_z(points)
-    assert stands_along_z(points * [5.0, 1.0, 1.0])  # a board that wide does stand
 
 
 def test_a_line_of_a_surface_can_be_placed() -> None:
