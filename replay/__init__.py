@@ -1,1 +1,1 @@
-"""Recorded streams behind the same interface as live ones: readers, the recorder, the player."""
+"""Recordings: readers of many file formats, the recorder, and playback as a live-like stream."""

@@ -1,4 +1,4 @@
-"""The built-in performance as a recording, for the demo and for whoever has none at hand."""
+"""The built-in motions as recordings, for the demo and for use without a recorded file."""
 
 from __future__ import annotations
 
@@ -9,20 +9,20 @@ from replay.recording import Recording
 
 
 def builtin_recording(name: str = "show") -> Recording:
-    """One loop of the act called `name`, 60 frames a second, nothing missing.
+    """Return one loop of the motion called `name`, 60 frames per second, without gaps.
 
     Raises:
-        InputError: there is none of that name; the message lists those there are.
+        InputError: no motion has that name; the message lists the known ones.
     """
-    act = motion_clip(name)
-    frames, joints = act.positions.shape[:2]
+    clip = motion_clip(name)
+    frames, joints = clip.positions.shape[:2]
     return Recording(
-        skeleton=act.skeleton,
-        times=act.times,
-        positions=act.positions,
-        rotations=act.rotations,
+        skeleton=clip.skeleton,
+        times=clip.times,
+        positions=clip.positions,
+        rotations=clip.rotations,
         confidence=np.ones((frames, joints)),
         performers=np.zeros(frames, dtype=np.int64),
         arrivals=np.full(frames, np.nan),
-        notes=(f"built-in performance: {name}",),
+        notes=(f"built-in motion: {name}",),
     )

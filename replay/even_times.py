@@ -1,4 +1,4 @@
-"""Motion at even times, for formats that have one time step for all frames."""
+"""Resample motion at evenly spaced times, for formats with one time step for all frames."""
 
 from __future__ import annotations
 
@@ -12,17 +12,17 @@ from devices.errors import InputError
 Array = NDArray[np.float64]
 
 MOST_TIMES = 2_000_000  # 9 hours at 60 Hz
-_LENGTHEN = 16  # a gappy recording may become so many times as many frames, at most
+_LENGTHEN = 16  # largest factor by which gaps may increase the number of frames
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class EvenTimes:
-    """Where even times lie among given ones.
+    """Evenly spaced times in terms of the given ones.
 
     Attributes:
         step: between two even times [s].
-        after: (N,) the given time at or after each even one.
-        share: (N,) in [0, 1]: how far each is on the way there from the given time before.
+        after: (N,) index of the given time at or after each even time.
+        share: (N,) in [0, 1]: position of each even time between the given times before and after.
     """
 
     step: float
@@ -30,14 +30,13 @@ class EvenTimes:
     share: Array
 
     def vectors(self, values: Array) -> Array:
-        """Values (T, ...) at the even times (N, ...), linearly."""
+        """Interpolate values (T, ...) linearly at the even times (N, ...)."""
         weight = self.share.reshape(-1, *[1] * (values.ndim - 1))
         blended: Array = (1 - weight) * values[self.after - 1] + weight * values[self.after]
         return blended
 
     def rotations(self, quaternions: Array) -> Array:
-        """Unit quaternions (T, ..., 4) at the even times, linearly on the shorter arc and
-        normalised."""
+        """Interpolate unit quaternions (T, ..., 4) linearly on the shorter arc, and normalise."""
         before, after = quaternions[self.after - 1], quaternions[self.after]
         opposite = np.sum(before * after, axis=-1, keepdims=True) < 0
         weight = self.share.reshape(-1, *[1] * (quaternions.ndim - 1))
@@ -47,21 +46,21 @@ class EvenTimes:
 
 
 def even_times(times: Array, rate: float | None = None) -> EvenTimes | None:
-    """Even times from the first to the last of `times` (T,) [s], which rise; None for fewer than 2.
+    """Return even times from the first to the last of `times`; None for fewer than two.
 
     Args:
-        times: of the frames.
-        rate: frames a second; by default that of the median step. A recording with gaps gets no
-            more than 16 times its frames.
+        times: (T,) [s] of the frames, rising.
+        rate: frames per second; by default that of the median step. A recording with gaps gets at
+            most 16 times its number of frames.
 
     Raises:
-        InputError: that would be more than `MOST_TIMES`.
+        InputError: there would be more than `MOST_TIMES`.
     """
     if len(times) < 2:
         return None
     span = float(times[-1] - times[0])
     if rate is None:
-        # An ever so slightly other step keeps the last frame.
+        # A slightly adjusted step keeps the last frame.
         usual = max(float(np.median(np.diff(times))), span / (_LENGTHEN * len(times)))
         count = max(round(span / usual), 1)
         step = span / count
@@ -69,7 +68,7 @@ def even_times(times: Array, rate: float | None = None) -> EvenTimes | None:
         step = 1.0 / rate
         count = int(span / step + 1e-6)
     if count > MOST_TIMES:
-        raise InputError(f"{count + 1} frames are too many; ask for a lower rate")
+        raise InputError(f"{count + 1} frames are too many; give a lower rate")
     even = times[0] + np.minimum(step * np.arange(count + 1), span)
     after = np.clip(np.searchsorted(times, even), 1, len(times) - 1)
     share = (even - times[after - 1]) / (times[after] - times[after - 1])

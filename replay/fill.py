@@ -1,8 +1,7 @@
-"""The fill stage: joints that were not seen are held, then eased to rest; nothing after sees a NaN.
+"""Fill joints that were not seen: they keep their offset, then ease to rest; no NaN remains.
 
-A joint is held relative to its parent, so that a hidden hand goes along with its arm. Where the
-root itself is hidden, it is placed from the seen joint nearest to it, so that a hidden pelvis goes
-along with the shoulders.
+A joint keeps its offset from its parent, so a hidden hand follows its arm. A hidden root is placed
+from the nearest seen joint, so a hidden pelvis follows the shoulders.
 """
 
 from __future__ import annotations
@@ -18,8 +17,8 @@ from solvers.kernels.compiled import exact_kernel
 
 KEEP_SECONDS = 0.5
 EASE_SECONDS = 1.0
-MOST_PERFORMERS = 64  # that are remembered; a sensor may number people anew for ever
-FARTHEST = 100.0  # [m] from the origin; what claims to lie further was not seen
+MOST_PERFORMERS = 64  # performers that are remembered; a sensor may assign ever new numbers
+FARTHEST = 100.0  # [m] from the origin; a position beyond counts as not seen
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -27,10 +26,10 @@ Indices = NDArray[np.int64]
 Records = NDArray[np.void]
 Record = Any  # one of them; compiled code writes through it
 
-# Of each joint: its parent, itself for the root; the joints one after another, parents first.
-# Where it stands at rest, from its parent or, the root, from the origin; where it stood from its
-# parent when it was last seen, and when; where it is taken to stand if it is not seen now. The mean
-# length of its bone, and over how many frames.
+# Of each joint: its parent (itself for the root); the joints in order, parents first; its rest
+# position, relative to its parent or, for the root, to the origin; its last seen offset from the
+# parent, and the time; its assumed offset if it is not seen now; the mean length of its bone, and
+# the number of frames of that mean.
 _JOINT = np.dtype(
     [
         ("parent", np.int64),
@@ -47,11 +46,11 @@ _JOINT = np.dtype(
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FilledFrame:
-    """A frame in which every joint has a place.
+    """A frame in which every joint has a position.
 
     Attributes:
         positions: (J, 3) [m], all finite.
-        filled: (J,) bool, True where the joint was not seen and its place is a guess.
+        filled: (J,) bool, True where the joint was not seen and its position is a guess.
     """
 
     positions: Array
@@ -60,8 +59,8 @@ class FilledFrame:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Memory:
-    """What is known of one performer: of each joint, and where the root (3,) [m] was, NaN before
-    the first frame."""
+    """State of one performer: the joints, and the root's last position (3,) [m], NaN before the
+    first frame."""
 
     joints: Records
     root: Array
@@ -75,21 +74,20 @@ class FillerState:
 
 
 class Filler:
-    """Fills frames of one skeleton; remembers each performer apart.
+    """Fills frames of one skeleton, with separate state for each performer.
 
     Args:
-        skeleton: of all frames; its rest pose is what an unseen joint returns to, scaled to the
-            performer's size.
-        hold: how long [s] an unseen joint keeps its place relative to its parent.
-        ease: how long [s] it then takes to come to rest: the bone turns by slerp, with
-            3w^2 - 2w^3 of the time passed.
+        skeleton: of all frames; an unseen joint returns to its rest pose, scaled to the performer.
+        keep: time [s] for which an unseen joint keeps its offset from its parent.
+        ease: time [s] of the following transition to rest: the bone turns by slerp, with
+            3w^2 - 2w^3 of the elapsed share w.
     """
 
     def __init__(
-        self, skeleton: Skeleton, *, hold: float = KEEP_SECONDS, ease: float = EASE_SECONDS
+        self, skeleton: Skeleton, *, keep: float = KEEP_SECONDS, ease: float = EASE_SECONDS
     ) -> None:
         self.skeleton = skeleton
-        self.hold = hold
+        self.keep = keep
         self.ease = ease
         rest, root = skeleton.rest_positions, skeleton.root
         parents = np.where(skeleton.parents < 0, root, skeleton.parents)
@@ -117,7 +115,7 @@ class Filler:
         }
 
     def fill(self, frame: SkeletonFrame) -> FilledFrame:
-        """The frame with every joint placed; see `place`."""
+        """Return the frame with every joint placed; see `place`."""
         return self.place(frame.positions, frame.time, frame.performer)
 
     def place(self, positions: Array, time: float, performer: int) -> FilledFrame:
@@ -126,17 +124,17 @@ class Filler:
         Args:
             positions: (J, 3) [m]; NaN where not seen.
             time: [s].
-            performer: whose they are.
+            performer: number of the performer.
 
         Raises:
-            ValueError: it has not the skeleton's number of joints.
+            ValueError: the number of joints differs from the skeleton's.
         """
         expected = (len(self._unseen), 3)
         if positions.shape != expected:
             raise ValueError(f"Expected positions {expected}, got {positions.shape}")
         memory = self._memory(performer)
         placed, filled = positions.copy(), np.empty(len(positions), dtype=np.bool_)
-        _fill(memory.joints, memory.root, placed, filled, (time, self.hold, self.ease))
+        _fill(memory.joints, memory.root, placed, filled, (time, self.keep, self.ease))
         return FilledFrame(placed, filled)
 
     def _memory(self, performer: int) -> _Memory:
@@ -153,10 +151,10 @@ class Filler:
 def _fill(
     joints: Records, root: Array, positions: Array, filled: Bools, times: tuple[float, float, float]
 ) -> None:
-    time, hold, ease = times
+    time, keep, ease = times
     if _look(joints, positions, filled, time):
         scale = _scale(joints)
-        _guess(joints, scale, time, hold, ease)
+        _guess(joints, scale, time, keep, ease)
         if np.isnan(root[0]):
             root[:] = joints[joints[0].order].rest * scale
         _place(joints, positions, filled, root)
@@ -166,14 +164,14 @@ def _fill(
 
 @exact_kernel
 def was_seen(place: Array) -> bool:
-    """Whether a place (3,) [m] has no NaN and lies not beyond `FARTHEST`."""
+    """Whether a position (3,) [m] has no NaN and lies within `FARTHEST`."""
     x, y, z = np.abs(place)
     return bool(x <= FARTHEST and y <= FARTHEST and z <= FARTHEST)
 
 
 @exact_kernel
 def _look(joints: Records, positions: Array, filled: Bools, time: float) -> bool:
-    """Tell which joints must be filled, and whether any; measure the bones that are seen."""
+    """Mark the joints to fill; return whether there are any; measure the seen bones."""
     for index, joint in enumerate(joints):
         filled[index] = not was_seen(positions[index])
         joint.seen_at = min(joint.seen_at, time)  # a clock that went back
@@ -192,7 +190,7 @@ def _is_bone(joint: Record, index: int) -> bool:
 
 @exact_kernel
 def _scale(joints: Records) -> float:
-    """How much larger the performer is than the rest pose."""
+    """Size of the performer relative to the rest pose."""
     ratios = np.empty(len(joints))
     known = 0
     for joint in joints:
@@ -203,10 +201,10 @@ def _scale(joints: Records) -> float:
 
 
 @exact_kernel
-def _guess(joints: Records, scale: float, time: float, hold: float, ease: float) -> None:
-    """Tell where each joint stands from its parent if it is not seen now."""
+def _guess(joints: Records, scale: float, time: float, keep: float, ease: float) -> None:
+    """Set the assumed offset of each joint from its parent, for use if it is not seen now."""
     for joint in joints:
-        age = time - joint.seen_at - hold
+        age = time - joint.seen_at - keep
         if age <= 0.0:
             joint.guess[:] = joint.offset
         elif age >= ease:
@@ -218,7 +216,7 @@ def _guess(joints: Records, scale: float, time: float, hold: float, ease: float)
 
 @exact_kernel
 def _place(joints: Records, positions: Array, filled: Bools, root: Array) -> None:
-    """Put joints that must be filled where they stand from their parents."""
+    """Place the joints to fill at their assumed offsets."""
     placed, order = ~filled, joints["order"]
     if filled[order[0]]:
         positions[order[0]] = root
@@ -244,8 +242,8 @@ def _nearest_seen(order: Indices, filled: Bools) -> int:
 
 @exact_kernel
 def _remember(joints: Records, positions: Array, filled: Bools, time: float) -> None:
-    # A joint whose parent was guessed keeps its old offset only while the guess came from it;
-    # elsewhere the offset from the guess is what keeps the joint still when it disappears.
+    # If a joint's parent was guessed, its old offset is kept only if the guess used it; otherwise
+    # the offset from the guess is what keeps the joint still when it disappears.
     for index, joint in enumerate(joints):
         if not filled[index]:
             joint.offset[:] = positions[index] - positions[joint.parent]
@@ -254,10 +252,10 @@ def _remember(joints: Records, positions: Array, filled: Bools, time: float) -> 
 
 @exact_kernel
 def turn(start: Array, end: Array, weight: float, out: Array) -> None:
-    """Put a vector on its way from `start` to `end` (3,), by `weight` in [0, 1], into `out` (3,).
+    """Write to `out` (3,) the vector a share `weight` in [0, 1] of the way from `start` to `end`.
 
-    The direction goes by slerp, the length linearly. Opposite directions turn by way of an axis at
-    right angles to them.
+    The direction is interpolated by slerp, the length linearly. Opposite directions turn about an
+    axis at right angles to them.
     """
     before, after = _length(start), _length(end)
     if min(before, after) <= 1e-9:

@@ -1,4 +1,4 @@
-"""Which reader opens which recording: known by its content, not only by its name."""
+"""Recognise the format of a recording by its content, and read it."""
 
 from __future__ import annotations
 
@@ -24,12 +24,12 @@ HEAD_BYTES = 4096
 
 @dataclass(frozen=True, slots=True)
 class RecordingFormat:
-    """One kind of recorded file.
+    """A file format of recordings.
 
     Attributes:
-        name: what `bunraku info` calls it.
-        recognises: whether a file is of this kind, from its path and its first `HEAD_BYTES` bytes.
-        read: the whole file as a `Recording`; raises InputError naming the file and what is wrong.
+        name: its name in `bunraku info`.
+        recognises: whether a file has this format, from its path and first `HEAD_BYTES` bytes.
+        read: reads the file; raises InputError that names the file and the fault.
     """
 
     name: str
@@ -38,7 +38,7 @@ class RecordingFormat:
 
 
 def formats() -> tuple[RecordingFormat, ...]:
-    """Every kind of recording that can be opened, the most certain to recognise first."""
+    """Return every readable format, the most certain to recognise first."""
     return (
         RecordingFormat("Bunraku recording (MCAP)", recognises_mcap, read_mcap),
         RecordingFormat("Bunraku table (CSV)", recognises_joint_table, read_joint_table),
@@ -54,10 +54,10 @@ def formats() -> tuple[RecordingFormat, ...]:
 
 
 def recognise(path: Path) -> RecordingFormat:
-    """The format of the file at `path`.
+    """Return the format of the file at `path`.
 
     Raises:
-        InputError: there is no such file, it cannot be read, or no reader knows it.
+        InputError: the file does not exist, cannot be read, or has an unknown format.
     """
     try:
         with path.open("rb") as file:
@@ -70,11 +70,11 @@ def recognise(path: Path) -> RecordingFormat:
         if candidate.recognises(path, head):
             return candidate
     known = ", ".join(candidate.name for candidate in formats())
-    raise InputError(f"{path} is not a recording that can be read; known kinds: {known}")
+    raise InputError(f"{path} is not a recording that can be read; known formats: {known}")
 
 
 def read_recording(path: Path) -> Recording:
-    """The recording in the file at `path`, of whatever kind.
+    """Read the recording in the file at `path`, of any known format.
 
     Raises:
         InputError: see `recognise` and the readers.

@@ -1,4 +1,4 @@
-"""What is in a recording, in a few lines for people: `bunraku info`."""
+"""Summarise a recording in a few lines: `bunraku info`."""
 
 from __future__ import annotations
 
@@ -10,21 +10,21 @@ from numpy.typing import NDArray
 
 from replay.recording import Recording
 
-GAP_FACTOR = 3.0  # a step this many medians long is a gap
-MOST_GAPS = 5  # that are listed, the longest
-MOST_LISTED = 16  # performers
+GAP_FACTOR = 3.0  # a step of more than this many medians is a gap
+MOST_GAPS = 5  # listed gaps, the longest ones
+MOST_LISTED = 16  # listed performers
 MOST_LETTERS = 300  # of a text from the file
 
 
 @dataclass(frozen=True, slots=True)
 class Gap:
-    """A time without a frame of a performer, far longer than the usual step.
+    """A time without a frame of a performer, much longer than the usual step.
 
     Attributes:
-        performer: whose.
-        begin: of the last frame before it [s].
+        performer: number of the performer.
+        begin: time of the last frame before the gap [s].
         seconds: until the next frame [s].
-        missing: about how many frames are not there.
+        missing: approximate number of missing frames.
     """
 
     performer: int
@@ -34,10 +34,10 @@ class Gap:
 
 
 def summary(recording: Recording, path: Path, kind: str) -> list[str]:
-    """Lines on `recording`, which was read from `path` as the format called `kind`.
+    """Return lines that describe `recording`, read from `path` in the format called `kind`.
 
-    Rate, jitter and gaps are of each performer's own frames. Jitter is the 95th percentile of how
-    far a step is from the median step.
+    Rate, jitter and gaps refer to each performer's own frames. Jitter is the 95th percentile of the
+    deviation of a step from the median step.
     """
     names = recording.skeleton.names
     steps = performer_steps(recording)
@@ -62,12 +62,12 @@ def summary(recording: Recording, path: Path, kind: str) -> list[str]:
 
 
 def _shown(text: str) -> str:
-    """Of a text from a file, what a terminal may safely show."""
+    """The part of a text from a file that a terminal can show safely."""
     return "".join(letter if letter.isprintable() else "?" for letter in text[:MOST_LETTERS])
 
 
 def gaps_of(recording: Recording) -> list[Gap]:
-    """Every gap, in the order of time; a gap is longer than three median steps of its performer."""
+    """Return every gap in order of time: steps longer than three medians of their performer."""
     gaps = []
     for performer in np.unique(recording.performers).tolist():
         times = recording.times[recording.performers == performer]
@@ -81,9 +81,9 @@ def gaps_of(recording: Recording) -> list[Gap]:
 
 
 def stamps_of(recording: Recording) -> tuple[int, int]:
-    """How many frames have the time of the one before, and how many came after a later one.
+    """Return how many frames repeat the time before, and how many came after a later frame.
 
-    The second is known where the file tells arrivals.
+    The second number is known only if the file holds arrivals.
     """
     repeated = late = 0
     for performer in np.unique(recording.performers):
@@ -97,7 +97,7 @@ def stamps_of(recording: Recording) -> tuple[int, int]:
 
 
 def performer_steps(recording: Recording) -> NDArray[np.float64]:
-    """Seconds between one frame and the next of the same performer, all performers together."""
+    """Return the seconds between consecutive frames of each performer, all performers together."""
     who = recording.performers
     return np.concatenate([np.diff(recording.times[who == one]) for one in np.unique(who)])
 
@@ -140,7 +140,7 @@ def _stamps(recording: Recording) -> str:
 
 
 def _performers(recording: Recording) -> list[str]:
-    """How many there are, and of several, who was there when."""
+    """The number of performers and, for several, the time span of each."""
     numbers = np.unique(recording.performers).tolist()
     lines = [f"performers  {len(numbers)}"]
     for number in numbers[:MOST_LISTED] if len(numbers) > 1 else []:

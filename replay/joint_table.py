@@ -1,9 +1,9 @@
-"""Recordings as tables for spreadsheets and scripts, which can be read back: CSV.
+"""Write recordings as CSV tables for spreadsheets and scripts, and read them back.
 
 The first line is a comment with the skeleton as JSON, the second names the columns: ``performer``,
-``time`` and ``arrival`` [s]; for each joint ``x``, ``y``, ``z`` [m] and ``confidence``; where there
-are rotations also ``qx``, ``qy``, ``qz``, ``qw``, joint to world. A row a frame; what is not known
-is ``nan``. Numbers have all their digits, so that a recording reads back bit for bit.
+``time`` and ``arrival`` [s]; for each joint ``x``, ``y``, ``z`` [m] and ``confidence``; if there
+are rotations also ``qx``, ``qy``, ``qz``, ``qw``, joint to world. Each further row is a frame;
+unknown values are ``nan``. Numbers have all their digits, so a recording is read back bit for bit.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from devices.errors import InputError
 from devices.skeleton import Skeleton
-from replay.mcap.reader import decode_skeleton, encode_skeleton
+from replay.mcap.frame_json import decode_skeleton, encode_skeleton
 from replay.recording import Recording
 
 Array = NDArray[np.float64]
@@ -58,12 +58,12 @@ def write_joint_table(file: TextIO, recording: Recording) -> None:
 
 
 def recognises_joint_table(path: Path, head: bytes) -> bool:
-    """Whether a file begins as `write_joint_table` begins one."""
+    """Whether a file begins like one of `write_joint_table`."""
     return head.removeprefix(b"\xef\xbb\xbf").startswith(MARK.encode())
 
 
 def read_joint_table(path: Path) -> Recording:
-    """The recording of `write_joint_table`, in the order of its times, which start at 0.
+    """Read a file of `write_joint_table`; frames are sorted by time, and times start at 0.
 
     Raises:
         InputError: the file cannot be read, its skeleton is damaged, or a row does not fit it.
@@ -73,8 +73,8 @@ def read_joint_table(path: Path) -> Recording:
     per_joint, left = divmod(rows.shape[1] - 3, joints)
     if left or per_joint not in (4, 8):
         raise InputError(
-            f"{path}: a row has {rows.shape[1]} columns; 3 and 4 or 8 for each of its {joints} "
-            "joints were expected"
+            f"{path}: a row has {rows.shape[1]} columns; expected 3 and 4 or 8 for each of its "
+            f"{joints} joints"
         )
     if not np.isfinite(rows[:, :2]).all():
         raise InputError(f"{path}: a row has no performer or no time")
@@ -105,7 +105,7 @@ def _parsed(path: Path) -> tuple[Skeleton, Array]:
             skeleton = decode_skeleton(file.readline().removeprefix(MARK))
             file.readline()
             with warnings.catch_warnings():
-                warnings.simplefilter("ignore", UserWarning)  # no row: said below
+                warnings.simplefilter("ignore", UserWarning)  # no rows: reported below
                 rows = np.loadtxt(file, delimiter=",", ndmin=2)
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror or error}") from error

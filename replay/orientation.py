@@ -14,11 +14,11 @@ from devices.skeleton import Skeleton
 Array = NDArray[np.float64]
 
 _SIDES = (Side.LEFT, Side.RIGHT)
-_MOST_SAMPLES = 200  # frames that a statistic of the whole recording looks at
-_REST_WEIGHT = 0.2  # of the rest pose beside the motion, for whoever lies down all the time
-_SPINE_WEIGHT = 0.5  # of the spine beside the legs: an elephant's lies level
-_LEAST_TURN = 0.2  # of the joints' distance that must be left, seen from above, to tell a heading
-_STRAIGHT = 0.96  # of the bones' lengths from ankle to head that the straight distance must be
+_MOST_SAMPLES = 200  # frames used for a statistic of the whole recording
+_REST_WEIGHT = 0.2  # of the rest pose beside the motion, for a performer who lies all the time
+_SPINE_WEIGHT = 0.5  # of the spine beside the legs: an elephant's spine is level
+_LEAST_TURN = 0.2  # of the joints' distance that must remain, seen from above, to give a heading
+_STRAIGHT = 0.96  # least ratio of the distance from ankle to head to the length of the bones
 _LEAST_STANDING = 0.1  # of all frames
 _LEG_AND_SPINE = 0.87  # of a body's height: hip to ankle and pelvis to head, along the bones
 
@@ -26,9 +26,9 @@ _LEG_AND_SPINE = 0.87  # of a body's height: hip to ankle and pelvis to head, al
 def up_axis(
     skeleton: Skeleton, parts: Sequence[BodyPart | None], positions: Array, rest: Array
 ) -> Array | None:
-    """The axis (3,) of the recording's own frame along which the body stands, a unit vector.
+    """Return the axis (3,) of the recording's own frame along which the body stands, a unit vector.
 
-    Legs tell first, from foot to hip; the spine counts half; the rest pose a fifth.
+    Legs, from foot to hip, have weight 1, the spine a half, the rest pose a fifth.
 
     Args:
         skeleton: of `positions`; only its tree is used.
@@ -37,7 +37,7 @@ def up_axis(
         rest: (J, 3), in the same frame.
 
     Returns:
-        The axis, or None where the skeleton has neither legs nor a head over hips.
+        The axis, or None if the skeleton has neither legs nor a head above hips.
     """
     frames = _sampled(positions)
     rising = _rising(skeleton, parts, frames)
@@ -57,7 +57,7 @@ def up_axis(
 def stands_upright(
     skeleton: Skeleton, parts: Sequence[BodyPart | None], positions: Array, up: Array
 ) -> bool:
-    """Whether the head is above the hips, within 60 degrees, in most frames: a biped's body."""
+    """Whether the head is above the hips, within 60 degrees, in most frames, as in a biped."""
     spine = _between(
         _place(skeleton, parts, Kind.HIPS), _head(skeleton, parts), _sampled(positions)
     )
@@ -69,7 +69,7 @@ def stands_upright(
 
 
 def legs_hang(skeleton: Skeleton, parts: Sequence[BodyPart | None], pose: Array, up: Array) -> bool:
-    """Whether the legs of a pose (J, 3) that has any hang within 60 degrees."""
+    """Whether the legs of a pose (J, 3), if it has any, hang within 60 degrees."""
     for side in _SIDES:
         hip, foot = (_place(skeleton, parts, kind, side) for kind in (Kind.UPPER_LEG, Kind.FOOT))
         leg = _between(foot, hip, pose[None])
@@ -81,10 +81,10 @@ def legs_hang(skeleton: Skeleton, parts: Sequence[BodyPart | None], pose: Array,
 def standing_axis(
     skeleton: Skeleton, parts: Sequence[BodyPart | None], positions: Array
 ) -> Array | None:
-    """The direction (3,) in which the body stands, feet to head, in frames where it is straight.
+    """Return the direction (3,) from feet to head in frames in which the body is straight.
 
-    A camera that looks down sees everybody lean; the median over the frames in which legs and back
-    are stretched is the vertical. None where there are too few of them to say.
+    A camera that looks down sees everyone lean; the median over the frames in which legs and back
+    are stretched is the vertical. None if there are too few such frames.
 
     Args:
         skeleton: of `positions`.
@@ -109,10 +109,10 @@ def standing_axis(
 
 
 def body_height(skeleton: Skeleton, parts: Sequence[BodyPart | None], rest: Array) -> float | None:
-    """How tall a person with these bones is, from the lengths of leg and spine; pose-free.
+    """Return the height of a person with these bones, from leg and spine lengths, in any pose.
 
     Returns:
-        The height in the unit of `rest`, or None where a leg, the hips or the head is missing.
+        The height in the unit of `rest`, or None if a leg, the hips or the head is missing.
     """
     head = _head(skeleton, parts)
     hips = _place(skeleton, parts, Kind.HIPS)
@@ -127,32 +127,19 @@ def body_height(skeleton: Skeleton, parts: Sequence[BodyPart | None], rest: Arra
 
 
 def up_to_y(up: Array) -> Array:
-    """The rotation (3, 3) that carries the axis `up`, one of the six, to +Y by a quarter turn."""
+    """Return the rotation (3, 3) by quarter turns that carries `up`, one of six axes, to +Y."""
     y = np.array([0.0, 1.0, 0.0])
     if up[1] != 0:
-        return np.diag([1.0, up[1], up[1]])  # half a turn about X when the body hangs from -Y
+        return np.diag([1.0, up[1], up[1]])  # half a turn about X if -Y is up
     turn = np.cross(up, y)
     return np.outer(turn, turn) + np.outer(y, up) - np.outer(up, y)
 
 
-def upright(axis: Array) -> Array:
-    """The smallest rotation (3, 3) that carries the unit vector `axis`, not -Y, to +Y."""
-    x, y, z = axis
-    # Rodrigues' formula about axis x Y, written out; 1 + y > 0 as the axis does not point down.
-    return np.array(
-        [
-            [1 - x * x / (1 + y), -x, -x * z / (1 + y)],
-            [x, y, z],
-            [-x * z / (1 + y), -z, 1 - z * z / (1 + y)],
-        ]
-    )
-
-
 def yaw_to_front(skeleton: Skeleton, positions: Array) -> Array | None:
-    """The rotation (3, 3) about +Y after which the performer faces +Z in the first frame.
+    """Return the rotation (3, 3) about +Y after which the performer faces +Z in the first frame.
 
-    Hips and shoulders tell: left must come to lie on +X. The first frame in which they are seen and
-    not one above the other decides.
+    Left hips and shoulders are turned to +X. The first frame in which they are seen and are not one
+    above the other decides.
 
     Args:
         skeleton: of `positions`.
@@ -176,7 +163,7 @@ def yaw_to_front(skeleton: Skeleton, positions: Array) -> Array | None:
 
 
 def floor_and_start(positions: Array, hips: int, stray: float = 0.0) -> Array:
-    """What to subtract (3,): the lowest joint comes to y = 0, the hips' start to x = z = 0.
+    """Return the offset (3,) to subtract: lowest joint to y = 0, first hips to x = z = 0.
 
     Args:
         positions: (T, J, 3); NaN where not seen.
@@ -210,7 +197,7 @@ def _between(start: int | None, end: int | None, frames: Array) -> Array | None:
 
 
 def _rising(skeleton: Skeleton, parts: Sequence[BodyPart | None], frames: Array) -> Array | None:
-    """In each frame (T, 3) the sum of what points up along a standing body."""
+    """In each frame (T, 3), the sum of the vectors that point up along a standing body."""
     vectors = []
     for side in _SIDES:
         foot = _place(skeleton, parts, Kind.FOOT, side)
@@ -226,7 +213,7 @@ def _rising(skeleton: Skeleton, parts: Sequence[BodyPart | None], frames: Array)
 
 
 def _along(skeleton: Skeleton, rest: Array, start: int, end: int) -> float:
-    """Length along the bones from `end` up to `start`, or straight where that is no ancestor."""
+    """Length of the bones from `end` up to `start`, or the straight distance if not an ancestor."""
     length, joint = 0.0, end
     while joint != start:
         parent = int(skeleton.parents[joint])

@@ -1,4 +1,4 @@
-"""A stream whose frames are recorded as they arrive, however seldom it is polled."""
+"""A stream that passes every frame to a recorder on arrival, however seldom it is polled."""
 
 from __future__ import annotations
 
@@ -14,24 +14,24 @@ Keep = Callable[[SkeletonFrame], None]
 
 @runtime_checkable
 class Tapped(Protocol):
-    """A stream with a thread of its own that can show each frame the moment it comes."""
+    """A stream with its own thread that can pass on each frame on arrival."""
 
     def tap(self, listener: Keep) -> None:
-        """Call `listener` with every frame from now on, in order, on the thread it comes on."""
+        """Call `listener` with every frame from now on, in order, on the receiving thread."""
         ...
 
 
 class RecordedStream:
-    """Gives the frames of `stream` on, and each to `keep` first, in order and exactly once.
+    """Passes on the frames of `stream`, each first to `keep`, in order and exactly once.
 
-    From a live device they are taken on its own thread, before they wait for the frame loop, so
-    that a loop that stands still or drops frames costs the recording none. A stream that only has
-    frames when it is polled, such as a player, is recorded as it is polled.
+    Frames of a live device are taken on its own thread, before they wait for the frame loop, so a
+    loop that pauses or drops frames does not affect the recording. A stream that has frames only
+    when it is polled, such as a player, is recorded as it is polled.
 
     Args:
         stream: is closed with this one.
-        keep: takes a frame and neither raises nor, for a live device, waits; may be exchanged at
-            any time, None keeps nothing.
+        keep: takes a frame; it must not raise nor, for a live device, wait. It may be exchanged at
+            any time; None keeps nothing.
     """
 
     def __init__(self, stream: SkeletonStream, keep: Keep | None = None) -> None:
@@ -48,7 +48,7 @@ class RecordedStream:
 
     @property
     def ended(self) -> bool:
-        """True once no frame can come any more."""
+        """True once no further frame can come."""
         return self._stream.ended
 
     @property
@@ -57,7 +57,7 @@ class RecordedStream:
         return playback_of(self._stream)
 
     def poll(self) -> Sequence[SkeletonFrame]:
-        """Every frame that has come since the last poll, oldest first."""
+        """Return every frame since the last poll, oldest first."""
         frames = self._stream.poll()
         if not self._tapped:
             for frame in frames:

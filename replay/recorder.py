@@ -1,4 +1,4 @@
-"""The recorder of a running show: takes every frame at once, writes from a thread of its own."""
+"""Record the frames of a running show: queue each frame at once, write on a separate thread."""
 
 from __future__ import annotations
 
@@ -13,27 +13,26 @@ from devices.skeleton import Skeleton, SkeletonFrame
 from replay.mcap.writer import SYNC_SECONDS, McapWriter
 
 WAITING = 16_384
-"""Frames that wait for the disk at most, about 80 MB of 59 joints: a minute of four performers at
-60 Hz while the disk stands still."""
+"""Largest number of frames that wait for the disk, about 80 MB of 59 joints: a minute of four
+performers at 60 Hz while the disk does not respond."""
 
 
 class Recorder:
-    """Records frames to an MCAP file; no fault of the disk ever reaches who hands them over.
+    """Records frames to an MCAP file; faults of the disk do not affect the caller.
 
-    Frames wait in a queue of bounded length that a thread empties, whatever the frame loop does.
-    When the disk fails the file is kept up to there, `tell` gets one line at once, and what comes
-    after is counted. The numbers of lost frames are left out of the file's sequence, so that a
-    reader sees where they are missing.
+    Frames wait in a bounded queue that a thread empties. When the disk fails, the file is kept up
+    to that point, `tell` gets one line at once, and later frames are counted as lost. The file's
+    sequence skips the numbers of lost frames, so that a reader detects them.
 
     Args:
-        path: is replaced.
+        path: of the file; an existing file is replaced.
         skeleton: of every frame.
         source: see `McapWriter`.
-        tell: takes one line on what is wrong, from any thread, and must not raise.
-        waiting: frames that may wait for the disk.
+        tell: takes one line that describes a fault, from any thread; it must not raise.
+        waiting: largest number of frames that may wait for the disk.
 
     Raises:
-        InputError: the file cannot be made.
+        InputError: the file cannot be created.
     """
 
     def __init__(
@@ -58,21 +57,21 @@ class Recorder:
 
     @property
     def frames(self) -> int:
-        """Frames that are in the file."""
+        """Number of frames in the file."""
         return self._writer.safe if self._fault else self._writer.frames
 
     @property
     def lost(self) -> int:
-        """Frames that came and are not in the file: the disk was too slow, or failed."""
+        """Number of frames that came and are not in the file, by a slow or failed disk."""
         return self._overrun + self._unwritten + self._writer.frames - self.frames
 
     @property
     def fault(self) -> str:
-        """Why the recording stopped before its end; empty while all is well."""
+        """Why the recording stopped early; empty if it did not."""
         return self._fault
 
     def offer(self, frame: SkeletonFrame) -> None:
-        """Keep a frame without ever waiting; one that finds the queue full is lost and counted."""
+        """Record a frame without waiting; if the queue is full, the frame is lost and counted."""
         with self._lock:
             if self._closed:
                 return
@@ -87,7 +86,7 @@ class Recorder:
                     )
 
     def write(self, frame: SkeletonFrame) -> None:
-        """Keep a frame, waiting for room: for a source that itself waits, such as a recording."""
+        """Record a frame, waiting for room: for a source that can wait, such as a recording."""
         with self._lock:
             if self._closed:
                 return
@@ -95,7 +94,7 @@ class Recorder:
         self._queue.put((number, frame))
 
     def close(self) -> None:
-        """Write what waits and finish the file; tells faults, raises none. May be called twice."""
+        """Write what waits and finish the file; report faults, raise none. May be called twice."""
         with self._lock:
             closed, self._closed = self._closed, True
         if closed:
@@ -121,7 +120,7 @@ class Recorder:
             self._fail(error)
 
     def _next(self) -> tuple[int, SkeletonFrame] | None:
-        """The next frame, None at the end; while none comes, what has come goes to the disk."""
+        """The next frame, None at the end; while none comes, sync the file to the disk."""
         while True:
             try:
                 return self._queue.get(timeout=SYNC_SECONDS)
@@ -140,12 +139,12 @@ class Recorder:
         except InputError as error:
             self._fail(error)
         except ValueError:
-            pass  # a frame that no file could hold; the next one may be whole
-        except Exception as error:  # a show must outlive a mistake of ours in here
+            pass  # a frame that cannot be written; the next one may be valid
+        except Exception as error:  # a defect in here must not end the show
             self._fail(InputError(f"cannot write {self.path}: {error!r}; please report this"))
         if self._writer.moved and not (self._moved or self._fault):
             self._moved = True
-            self._tell(f"{self.path} was moved; the recording goes on in it, wherever it is now")
+            self._tell(f"{self.path} was moved; the recording continues in the moved file")
 
     def _fail(self, error: InputError) -> None:
         if not self._fault:

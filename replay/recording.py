@@ -1,4 +1,4 @@
-"""What a recording is, whatever file it came from."""
+"""A recording in memory: the frames of one file as stacked arrays, independent of its format."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from devices.skeleton import Skeleton, SkeletonFrame
 
 @dataclass(frozen=True, eq=False)
 class Recording:
-    """Every frame of a recorded performance, as stacked arrays.
+    """Every frame of a recording as stacked arrays.
 
     Attributes:
         skeleton: the skeleton of all frames.
@@ -23,13 +23,13 @@ class Recording:
             where a joint was not seen.
         rotations: (T, J, 4) quaternions (x, y, z, w), joint to world, or None.
         confidence: (T, J) in [0, 1], 0 where the position is NaN.
-        performers: (T,) int, whose frame each is.
-        arrivals: (T,) [s] when each came in; NaN where the file does not say.
-        notes: what the reader guessed or mended, one short line each, for `bunraku info`.
-        source: where the frames came from, as far as the file says: short texts by name.
+        performers: (T,) int, the performer of each frame.
+        arrivals: (T,) [s] arrival of each frame; NaN where the file has none.
+        notes: guesses and corrections of the reader, one short line each, for `bunraku info`.
+        source: facts about the origin of the frames, if the file has them: short texts by name.
 
     Raises:
-        InputError: no frame at all.
+        InputError: there is no frame.
     """
 
     skeleton: Skeleton
@@ -65,11 +65,11 @@ class Recording:
 
     @property
     def seconds(self) -> float:
-        """From the first frame to the last [s]."""
+        """Time from the first frame to the last [s]."""
         return float(self.times[-1] - self.times[0])
 
     def frame(self, index: int) -> SkeletonFrame:
-        """The frame numbered `index`, from 0."""
+        """Return frame number `index`, from 0."""
         return SkeletonFrame(
             time=float(self.times[index]),
             positions=self.positions[index],
@@ -80,16 +80,16 @@ class Recording:
         )
 
     def of(self, performer: int) -> Recording:
-        """The frames of one performer alone; times stay as they are.
+        """Return the frames of one performer; times are unchanged.
 
         Raises:
-            InputError: nobody in it has that number; the message lists who has.
+            InputError: no performer has that number; the message lists the known ones.
         """
         own = self.performers == performer
         if not own.any():
             there = ", ".join(str(number) for number in np.unique(self.performers))
             raise InputError(
-                f"there is no performer {performer} in the recording; there are: {there}"
+                f"there is no performer {performer} in the recording; known performers: {there}"
             )
         return replace(
             self,

@@ -1,7 +1,7 @@
-"""A skeleton of rigid bones that moves as recorded joints do: lengths, and a rotation a joint.
+"""Fit a skeleton of rigid bones to recorded joints: constant bone lengths, one rotation per joint.
 
-Sensors give joints whose distances waver; animation formats know bones that only turn. The lengths
-are medians over the recording, the rotations those that point every bone where it was seen.
+The distances of a sensor's joints vary; animation formats have bones that only rotate. Lengths are
+medians over the recording; rotations point every bone to its seen position.
 Source of the fit of one joint's bones: Kabsch 1976, "A solution for the best rotation to relate
 two sets of vectors".
 """
@@ -19,25 +19,27 @@ from devices.skeleton import Skeleton
 
 Array = NDArray[np.float64]
 
-_PRIOR = 1e-6  # weight of the rotation that is known already, beside the bones, for what they leave
+_PRIOR = 1e-6  # weight of the known rotation, for the degrees of freedom that bones leave open
 _ROUNDS = 3  # of fitting rotations to bones and bones to rotations
-_STEADY = 0.1  # of its length that a bone may stray in the frame of a joint whose turns carry it
-_SLIDES = 0.5  # of its length by which a bone must vary to be no bone, but a way to go
+_STEADY = 0.1  # of its length that a bone may deviate in its parent's frame to count as carried
+_SLIDES = 0.5  # of its length by which a bone must vary to count as sliding
 _SLIDES_FAR = 0.1  # [m] that it must vary at least
-_EXACT = 1e-4  # of its length that the usual bone strays where rotations come from no sensor
-_EXACT_FAR = 1e-3  # [m] that a bone must then stray to be a way to go
+_EXACT = (
+    1e-4  # of its length that most bones deviate at most if rotations do not come from a sensor
+)
+_EXACT_FAR = 1e-3  # [m] that a bone must then deviate to count as sliding
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class RigidMotion:
-    """A skeleton and how it turns.
+    """A skeleton of rigid bones and its motion.
 
     Attributes:
         skeleton: its rest positions are the fitted ones.
-        root: (T, 3) [m] where the root is.
+        root: (T, 3) [m] positions of the root.
         rotations: (T, J, 3, 3) world, since the rest pose.
-        slides: for joints that no bone holds, such as hips that walk away from a root that stays:
-            where each is (T, 3) [m] in its parent's frame.
+        slides: positions (T, 3) [m] in the parent's frame of joints without a rigid bone, such as
+            hips that walk away from a fixed root.
     """
 
     skeleton: Skeleton
@@ -46,7 +48,7 @@ class RigidMotion:
     slides: Mapping[int, Array] = field(default_factory=dict)
 
     def positions(self) -> Array:
-        """Where the joints come to be (T, J, 3) [m]."""
+        """Return the joint positions (T, J, 3) [m]."""
         skeleton = self.skeleton
         places = np.empty((len(self.root), len(skeleton.names), 3))
         for joint in skeleton.order:
@@ -64,14 +66,13 @@ class RigidMotion:
 def fit_rigid_bones(
     skeleton: Skeleton, positions: Array, rotations: Array | None = None
 ) -> RigidMotion:
-    """The rigid motion nearest to recorded joints.
+    """Return the rigid motion nearest to recorded joints.
 
-    Rotations of the source are kept where they carry the source's own bones, which those of a BVH
-    file do exactly; they decide the twist that positions leave open. Elsewhere a joint twists along
-    with its parent.
+    Rotations of the source are kept where they carry the source's own bones, as in a BVH file; they
+    determine the twist that positions leave open. Elsewhere a joint twists with its parent.
 
     Args:
-        skeleton: of the joints; its rest pose says what no turn at all looks like.
+        skeleton: of the joints; its rest pose has zero rotations.
         positions: (T, J, 3) [m], all finite.
         rotations: (T, J, 4) joint to world, in any frame of each joint; NaN where unknown.
     """
@@ -82,12 +83,12 @@ def fit_rigid_bones(
     if rotations is not None:
         own, exact = _since_rest(skeleton, bones, _matrices(rotations), sliding)
         sliding = sliding if exact is None else exact
-    held = np.where(sliding[:, None], 0.0, bones)  # what slides turns nobody
+    rigid = np.where(sliding[:, None], 0.0, bones)  # a sliding joint does not turn its parent
     rest = _with_lengths(skeleton, np.where(sliding, 0.0, np.median(lengths, axis=0)))
-    turned = aim_all(skeleton, rest, held, own)
+    turned = aim_all(skeleton, rest, rigid, own)
     for _ in range(_ROUNDS):
-        rest = _in_parents_frame(skeleton, held, turned)
-        turned = aim_all(skeleton, rest, held, own)
+        rest = _in_parents_frame(skeleton, rigid, turned)
+        turned = aim_all(skeleton, rest, rigid, own)
     slides = {
         int(joint): np.einsum("tji,tj->ti", turned[:, skeleton.parents[joint]], bones[:, joint])
         for joint in np.flatnonzero(sliding)
@@ -99,14 +100,14 @@ def fit_rigid_bones(
 
 
 def aim_all(skeleton: Skeleton, rest: Array, bones: Array, own: Array | None) -> Array:
-    """World rotations (T, J, 3, 3) since rest that turn each joint's bones to where they are.
+    """Return world rotations (T, J, 3, 3) since rest that turn each joint's bones to given vectors.
 
     Args:
         skeleton: the tree.
-        rest: (J, 3) each joint from its parent, at rest.
-        bones: (T, J, 3) the same in every frame.
-        own: (T, J, 3, 3) rotations since rest that are known; NaN, or None, where a joint turns
-            with its parent.
+        rest: (J, 3) offset of each joint from its parent at rest.
+        bones: (T, J, 3) the offsets in every frame.
+        own: (T, J, 3, 3) known rotations since rest; NaN, or None, where a joint turns with its
+            parent.
     """
     turned = np.empty((*bones.shape[:2], 3, 3))
     for joint in skeleton.order:
@@ -122,9 +123,9 @@ def aim_all(skeleton: Skeleton, rest: Array, bones: Array, own: Array | None) ->
 
 
 def aimed(prior: Array, rest: Array, seen: Array) -> Array:
-    """The rotations (T, 3, 3) nearest to `prior` that turn vectors at rest to seen ones.
+    """Return the rotations (T, 3, 3) nearest to `prior` that turn rest vectors to seen ones.
 
-    Least squares; the prior, weakly, decides what the vectors leave open: the twist.
+    Least squares; the prior, with a small weight, determines the twist that the vectors leave open.
 
     Args:
         prior: (T, 3, 3).
@@ -143,31 +144,31 @@ def aimed(prior: Array, rest: Array, seen: Array) -> Array:
 
 
 def as_matrices(quaternions: Array) -> Array:
-    """Rotations (..., 3, 3) of unit quaternions (..., 4)."""
+    """Return rotation matrices (..., 3, 3) of unit quaternions (..., 4)."""
     flat = Rotation.from_quat(quaternions.reshape(-1, 4)).as_matrix()
     matrices: Array = flat.reshape(*quaternions.shape[:-1], 3, 3)
     return matrices
 
 
 def _bones(skeleton: Skeleton, positions: Array) -> Array:
-    """Each joint from its parent (T, J, 3); 0 for the root."""
+    """Offset (T, J, 3) of each joint from its parent; 0 for the root."""
     parents = np.where(skeleton.parents < 0, skeleton.root, skeleton.parents)
     bones: Array = positions - positions[:, parents]
     return bones
 
 
 def _sliding(lengths: Array) -> NDArray[np.bool_]:
-    """Which joints (J,) are at no length (T, J) of a bone from their parent."""
+    """Which joints (J,) slide: their distances (T, J) from the parent vary too much for a bone."""
     least, middle, most = np.percentile(lengths, (1, 50, 99), axis=0)
     sliding: NDArray[np.bool_] = most - least > np.maximum(_SLIDES * middle, _SLIDES_FAR)
     return sliding
 
 
 def _resting(skeleton: Skeleton, joint: int, way: Array) -> Array:
-    """Where a sliding joint is put at rest (3,): as in the rest pose, if that is near its way.
+    """Rest offset (3,) of a sliding joint: that of the rest pose if it is near the path, else mean.
 
-    Readers of BVH tell places that replace an offset from those that add to it by what they are
-    nearer to, the offset or zero; the mean is never farther than zero.
+    BVH readers decide whether positions replace an offset or add to it by their distance to the
+    offset and to zero; the mean is never farther away than zero.
     """
     parent = skeleton.parents[joint]
     rest: Array = skeleton.rest_positions[joint] - skeleton.rest_positions[parent]
@@ -176,7 +177,7 @@ def _resting(skeleton: Skeleton, joint: int, way: Array) -> Array:
 
 
 def _stood(skeleton: Skeleton, rest: Array) -> Array:
-    """Joints (J, 3) from their places at their parents; the root where it rests."""
+    """Joint positions (J, 3) from offsets to the parents; the root at its rest position."""
     places = np.empty((len(skeleton.names), 3))
     for joint in skeleton.order:
         parent = int(skeleton.parents[joint])
@@ -187,7 +188,7 @@ def _stood(skeleton: Skeleton, rest: Array) -> Array:
 
 
 def _with_lengths(skeleton: Skeleton, lengths: Array) -> Array:
-    """The rest pose's bones (J, 3), in its directions and of these lengths (J,)."""
+    """Bones (J, 3) with the directions of the rest pose and the given lengths (J,)."""
     rest = _bones(skeleton, skeleton.rest_positions[None])[0]
     usual = np.linalg.norm(rest, axis=1)
     scale = np.divide(lengths, usual, out=np.zeros_like(usual), where=usual > 1e-9)
@@ -196,20 +197,20 @@ def _with_lengths(skeleton: Skeleton, lengths: Array) -> Array:
 
 
 def _in_parents_frame(skeleton: Skeleton, bones: Array, turned: Array) -> Array:
-    """Each bone (J, 3) as it lies, in the median, in its parent's frame."""
+    """Median of each bone (J, 3) in its parent's frame."""
     rest = np.zeros((len(skeleton.names), 3))
     for joint in np.flatnonzero(skeleton.parents >= 0):
         back = np.einsum("tji,tj->ti", turned[:, skeleton.parents[joint]], bones[:, joint])
         middle = np.median(back, axis=0)
         length = np.linalg.norm(middle)
-        # The median of each coordinate alone is a little short where directions waver.
+        # The median of each coordinate is a little short if directions vary.
         usual = np.median(np.linalg.norm(bones[:, joint], axis=1))
         rest[joint] = middle * (usual / length) if length > 1e-9 else middle
     return rest
 
 
 def _matrices(rotations: Array) -> Array:
-    """Rotations (T, J, 3, 3) of quaternions (T, J, 4); NaN where those are unknown."""
+    """Rotation matrices (T, J, 3, 3) of quaternions (T, J, 4); NaN where unknown."""
     unknown = np.isnan(rotations).any(axis=2)
     unit = rotations.copy()
     unit[unknown] = [0.0, 0.0, 0.0, 1.0]
@@ -221,11 +222,12 @@ def _matrices(rotations: Array) -> Array:
 def _since_rest(
     skeleton: Skeleton, bones: Array, matrices: Array, sliding: NDArray[np.bool_]
 ) -> tuple[Array, NDArray[np.bool_] | None]:
-    """The source's rotations as world rotations since rest (T, J, 3, 3), and what slides.
+    """The source's rotations as world rotations since rest (T, J, 3, 3), and the sliding joints.
 
-    Each joint's own frame is turned, once for the whole recording, such that its bones lie in it as
-    they do at rest. Rotations that do not carry their bones are NaN. Where they carry nearly all of
-    them exactly, the few others (J,) slide, however little; else that is None.
+    Each joint's own frame is turned, once for the whole recording, so that its bones lie as they do
+    at rest. Rotations that do not carry their bones are NaN. If the rotations carry nearly all
+    bones exactly, the few others (J,) count as sliding, however little they move; else that is
+    None.
     """
     local, usual, most = _local_bones(skeleton, bones, matrices)
     lengths = np.linalg.norm(local, axis=1)
@@ -249,8 +251,8 @@ def _since_rest(
 
 
 def _local_bones(skeleton: Skeleton, bones: Array, matrices: Array) -> tuple[Array, Array, Array]:
-    """Each bone (J, 3) in its parent's own frame, and how far (J,) it strays from there [m]: in the
-    median and, but for one frame in a hundred, at most; infinitely where no frame is known."""
+    """Each bone (J, 3) in its parent's own frame, and its deviation (J,) from there [m]: median and
+    99th percentile; infinite if no frame is known."""
     local = np.zeros((len(skeleton.names), 3))
     usual, most = np.full((2, len(skeleton.names)), np.inf)
     for joint in np.flatnonzero(skeleton.parents >= 0):

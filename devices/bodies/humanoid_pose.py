@@ -12,9 +12,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.bodies.forward_kinematics import ForwardKinematics, conjugate
 from devices.bodies.humanoid import ONWARD, OPTIONAL, SEGMENTS, humanoid_skeleton
 from devices.bodies.humanoid_kernels import Axes, Bones, Structure, WorldPose, pose_in_world
+from solvers.skeleton.joint_poses import ForwardKinematics
+from solvers.skeleton.quaternions import conjugate
 
 Array = NDArray[np.float64]
 

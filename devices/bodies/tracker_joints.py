@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from devices.bodies.forward_kinematics import conjugate, rotate
 from devices.bodies.humanoid import SIDES, humanoid_skeleton
 from devices.skeleton import Skeleton
+from solvers.skeleton.quaternions import conjugate, rotate
 
 Array = NDArray[np.float64]
 

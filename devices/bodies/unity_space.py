@@ -11,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from devices.bodies.forward_kinematics import multiply
+from solvers.skeleton.quaternions import multiply
 
 Array = NDArray[np.float64]
 

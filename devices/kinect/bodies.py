@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from devices.bodies.camera_level import CameraLevel
 from devices.bodies.performer_numbers import PerformerNumbers
 from devices.skeleton import Skeleton, SkeletonFrame
 from devices.transport.clock_map import ClockMap
+from solvers.skeleton.quaternions import followed_by
 
 Array = NDArray[np.float64]
 
@@ -164,8 +164,4 @@ def _in_world(body: SensorBody, to_world: Array) -> SensorBody:
 def _turned(rotations: Array, turn: Array) -> Array:
     """Rotations (J, 4) followed by `turn` (3, 3); NaN where a quaternion is no rotation."""
     length = np.linalg.norm(rotations, axis=1)
-    known = (length > 0.5) & (length < 2.0)  # False for NaN
-    out = np.full_like(rotations, np.nan)
-    if known.any():
-        out[known] = (Rotation.from_matrix(turn) * Rotation.from_quat(rotations[known])).as_quat()
-    return out
+    return followed_by(rotations, turn, known=(length > 0.5) & (length < 2.0))  # False for NaN

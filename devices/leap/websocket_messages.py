@@ -7,7 +7,6 @@ Source: leapjs, lib/protocol.js; Leap developer archive, "Leap_JSON".
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -15,6 +14,7 @@ from devices.leap.hands import leap_frame
 from devices.leap.performer import BOTH, LeapPerformer
 from devices.skeleton import Skeleton, SkeletonFrame
 from devices.transport.clock_map import ClockMap
+from devices.transport.json_object import json_object
 
 MOST_BYTES = 1 << 20
 MOST_DEVICES = 16
@@ -53,7 +53,7 @@ class LeapDecoder:
 
     def feed(self, data: bytes, arrival: float) -> Sequence[SkeletonFrame]:
         """Return the frame in a message received at `arrival` [s]; none for headers and events."""
-        message = _message(data)
+        message = json_object(data, MOST_BYTES)
         if isinstance(message.get("hands"), list):
             return [self._frame(message, arrival)]
         if not (self._header(message) or self._event(message.get("event"))):
@@ -83,14 +83,3 @@ class LeapDecoder:
             if name in self.devices or len(self.devices) < MOST_DEVICES:
                 self.devices[name] = (state.get("attached") is True, state.get("streaming") is True)
         return True
-
-
-def _message(data: bytes) -> dict[str, Any]:
-    """The JSON object in `data`; an empty one if there is none."""
-    if len(data) > MOST_BYTES:
-        return {}
-    try:
-        message = json.loads(data)
-    except (ValueError, RecursionError):
-        return {}
-    return message if isinstance(message, dict) else {}

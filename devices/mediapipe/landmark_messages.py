@@ -8,7 +8,6 @@ and jumping are kept. The first place is the origin then.
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -29,6 +28,7 @@ from devices.mediapipe.joints import (
 )
 from devices.skeleton import Skeleton, SkeletonFrame
 from devices.transport.clock_map import ClockMap
+from devices.transport.json_object import json_object
 
 Array = NDArray[np.float64]
 # Landmarks are (N, 4): x, y, z and confidence in [0, 1]; NaN, NaN, NaN, 0 where one is missing.
@@ -72,7 +72,7 @@ class LandmarkDecoder:
 
     def feed(self, data: bytes, arrival: float) -> Sequence[SkeletonFrame]:
         """Return a frame of each person in the message `data`, received at `arrival` [s]."""
-        message = _message(data)
+        message = json_object(data, MOST_BYTES)
         people = _people(message.get("pose_world_landmarks"), len(POSE_LANDMARKS))
         if people is None:
             self.refused += 1
@@ -159,16 +159,6 @@ def _frame(joints: Array, place: Array, number: int, times: tuple[float, float])
         performer=number,
         arrival=times[1],
     )
-
-
-def _message(data: bytes) -> dict[str, Any]:
-    if len(data) > MOST_BYTES:
-        return {}
-    try:
-        message = json.loads(data)
-    except (ValueError, RecursionError):
-        return {}
-    return message if isinstance(message, dict) else {}
 
 
 def _people(value: Any, count: int) -> list[Array | None] | None:

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from devices.bodies.floor_height import FloorHeight
 from devices.kinect.joints import KINECT_V2
 from devices.osc.nimate_messages import JointFormat
 from devices.osc.openni_joints import OPENNI
@@ -19,8 +20,6 @@ Array = NDArray[np.float64]
 MOST_SIZES = 60  # frames in which the torso is measured; its length is constant afterwards
 LEAST_TORSO = 1e-6  # units
 FARTHEST = 1000.0  # [m] of a plausible position
-_FEET = 150  # heights of lowest joints that are remembered
-_STANDING = 5.0  # percentile of them that is the floor: below it feet were tracked badly
 _STUBBORN = 100.0  # torsos: bound of the evidence, so that later evidence can outweigh it
 
 _HIPS, _NECK = KINECT_V2.index("SpineBase"), KINECT_V2.index("SpineShoulder")
@@ -56,7 +55,7 @@ class CameraBody:
         self._sizes: list[float] = []
         self._ratio = 1.0  # [m] per unit, from the torso
         self._left = self._up = 0.0  # sums, in torsos, of how far left was at +x, and up at +y
-        self._lowest: list[float] = []
+        self._floor = FloorHeight()
 
     def place(self, positions: Array, format: JointFormat) -> Array:
         """Return Kinect's joints (25, 3) [m] in our axes, upright on the floor.
@@ -74,7 +73,7 @@ class CameraBody:
             self._put_left_left(placed, length)
         if length > LEAST_TORSO and format is JointFormat.ANIMATA:
             self._put_upright(placed, torso[1] / length)
-        placed[:, 1] -= self._floor(placed)
+        placed[:, 1] -= self._floor_of(placed)
         placed *= self._unit(length, format)
         placed[~(np.abs(placed) < FARTHEST).all(axis=1)] = np.nan  # also where it is NaN
         return placed
@@ -102,12 +101,12 @@ class CameraBody:
             self._ratio = _TORSO / float(np.median(self._sizes))
         return self._ratio
 
-    def _floor(self, placed: Array) -> float:
-        """How high the floor is: where the lowest joint was, most of the time."""
+    def _floor_of(self, placed: Array) -> float:
+        """Height of the floor, including the lowest joint of this frame."""
         heights = placed[~np.isnan(placed[:, 1]), 1]
         if len(heights):
-            self._lowest = [*self._lowest[-_FEET + 1 :], float(heights.min())]
-        return float(np.percentile(self._lowest, _STANDING)) if self._lowest else 0.0
+            self._floor.add(float(heights.min()))
+        return self._floor.value
 
 
 def _in_our_axes(positions: Array, format: JointFormat) -> Array:

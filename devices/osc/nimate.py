@@ -29,7 +29,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.address import host_and_port, one_of, options_of, positive
-from devices.bodies.forward_kinematics import rotate
 from devices.bodies.performer_numbers import PerformerNumbers
 from devices.kinect.joints import KINECT_V2
 from devices.osc.camera_bodies import CameraBody
@@ -41,6 +40,7 @@ from devices.skeleton import Skeleton, SkeletonFrame
 from devices.transport.frame_assembly import FrameAssembly
 from devices.transport.live_stream import LiveStream
 from devices.transport.udp import UdpTransport
+from solvers.skeleton.quaternions import rotate
 
 Array = NDArray[np.float64]
 

@@ -10,7 +10,6 @@ Source: Rokoko Studio's custom streaming documentation, and its plug-ins.
 
 from __future__ import annotations
 
-import json
 import math
 from collections import OrderedDict
 from collections.abc import Mapping, Sequence
@@ -26,6 +25,7 @@ from devices.bodies.unity_space import across_unity, turn_across_unity
 from devices.skeleton import SkeletonFrame
 from devices.suits.rokoko_bones import SKELETON
 from devices.transport.clock_map import STEP_BACK, ClockMap
+from devices.transport.json_object import json_object
 from devices.transport.live_stream import LiveStream
 from devices.transport.udp import UdpTransport
 
@@ -147,15 +147,7 @@ def _scene(data: bytes) -> dict[str, Any] | None:
 
     A message of version 2.5 states version 3, so the structure decides, not the number.
     """
-    text = _unpacked(data)
-    if text is None:
-        return None
-    try:
-        message = json.loads(text)
-    except (ValueError, RecursionError):
-        return None
-    if not isinstance(message, dict):
-        return None
+    message = json_object(_unpacked(data) or b"", MOST_BYTES)
     scene = message.get("scene", message)
     if not isinstance(scene, dict):
         return None

@@ -1,1 +1,1 @@
-"""BVH motion-capture files, read and written."""
+"""Read and write BVH motion-capture files."""

@@ -1,4 +1,4 @@
-"""A recording of one performer as a BVH file: filled, on rigid bones, at even times."""
+"""Convert a recording of one performer to BVH: fill gaps, fit rigid bones, resample evenly."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from replay.rigid_bones import as_matrices, fit_rigid_bones
 
 
 @dataclass(frozen=True, slots=True)
-class BvhMade:
-    """What became of a recording in a BVH file.
+class BvhSummary:
+    """The frames of a written BVH file, and how well they follow the recording.
 
     Attributes:
-        frames: in the file.
-        step: between two of them [s].
-        filled: share of the joints that were not seen and are guesses.
-        strays: how far [m] seen joints lie from where they were recorded: median, 99th percentile,
-            most. Bones that keep their length cannot follow a sensor whose bones do not.
+        frames: number of frames in the file.
+        step: between two frames [s].
+        filled: share of joint positions that were not seen and are guesses.
+        strays: distance [m] of seen joints from their recorded positions: median, 99th percentile,
+            maximum. Bones of constant length cannot follow a sensor whose bones vary.
     """
 
     frames: int
@@ -37,23 +37,23 @@ class BvhMade:
 
 def write_bvh_recording(
     file: TextIO, recording: Recording, *, unit: str = "cm", rate: float | None = None
-) -> BvhMade:
-    """Write what one performer did.
+) -> BvhSummary:
+    """Write the motion of one performer.
 
-    What was not seen is filled as in a show (`replay.fill`). Bones get their median length and turn
-    to where they were seen (`replay.rigid_bones`). Frames are at even times, by default a median
-    step apart; in between, places are interpolated linearly and turns along the shorter arc.
+    Joints that were not seen are filled as in a show (`replay.fill`). Bones get their median length
+    and turn to the seen positions (`replay.rigid_bones`). Frames are evenly spaced, by default a
+    median step apart; positions are interpolated linearly, rotations along the shorter arc.
 
     Args:
         file: open for writing.
         recording: of one performer.
         unit: a key of `UNITS`.
-        rate: frames a second of the file.
+        rate: frames per second of the file.
 
     Raises:
-        InputError: there would be more poses than `replay.bvh.reader` reads.
+        InputError: the file would have more poses than `replay.bvh.reader` reads.
     """
-    fresh = np.flatnonzero(np.diff(recording.times, prepend=-np.inf) > 0)  # one frame a moment
+    fresh = np.flatnonzero(np.diff(recording.times, prepend=-np.inf) > 0)  # one frame per time
     filler = Filler(recording.skeleton)
     filled = [filler.fill(recording.frame(int(index))) for index in fresh]
     positions = np.stack([frame.positions for frame in filled])
@@ -65,7 +65,7 @@ def write_bvh_recording(
     root, turned, slides, step = motion.root, motion.rotations, motion.slides, LONE_STEP
     even = even_times(recording.times[fresh], rate)
     if even is not None and len(even.share) * len(recording.skeleton.names) > MOST_POSES:
-        raise InputError(f"{len(even.share)} frames are too many; ask for a lower rate")
+        raise InputError(f"{len(even.share)} frames are too many; give a lower rate")
     if even is not None:
         quaternions = Rotation.from_matrix(turned.reshape(-1, 3, 3)).as_quat()
         turned = as_matrices(even.rotations(quaternions.reshape(*turned.shape[:2], 4)))
@@ -74,4 +74,4 @@ def write_bvh_recording(
     per_metre = UNITS[unit]
     write_bvh(file, motion.skeleton, root, turned, slides=slides, step=step, per_metre=per_metre)
     median, most_of_all, most = (float(value) for value in strays)
-    return BvhMade(len(root), step, float(missing.mean()), (median, most_of_all, most))
+    return BvhSummary(len(root), step, float(missing.mean()), (median, most_of_all, most))

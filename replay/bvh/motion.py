@@ -1,4 +1,4 @@
-"""Forward kinematics of BVH: where each joint is and how it is turned, frame by frame."""
+"""Forward kinematics of BVH: positions and rotations of the joints in every frame."""
 
 from __future__ import annotations
 
@@ -6,12 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.bvh.text import BvhJoint, BvhText
+from solvers.skeleton.quaternions import rotate
 
 Array = NDArray[np.float64]
 
 
 def rest_positions(joints: list[BvhJoint]) -> Array:
-    """Where the joints stand when every rotation is zero (J, 3), in the file's unit and frame."""
+    """Return joint positions (J, 3) with all rotations zero, in the file's unit and frame."""
     rest = np.zeros((len(joints), 3))
     for index, joint in enumerate(joints):
         rest[index] = joint.offset
@@ -21,10 +22,10 @@ def rest_positions(joints: list[BvhJoint]) -> Array:
 
 
 def forward_kinematics(text: BvhText) -> tuple[Array, Array]:
-    """Positions (T, J, 3) in the file's unit and frame, rotations (T, J, 4), joint to world.
+    """Return positions (T, J, 3) in the file's unit and frame, rotations (T, J, 4) to world.
 
-    The rotation channels of a joint multiply in the order in which it declares them, the first
-    outermost. NaN in a channel makes the joint and all below it NaN.
+    The rotation channels of a joint multiply in the order of their declaration, the first
+    outermost. NaN in a channel makes the joint and all its descendants NaN.
     """
     frames, count = len(text.motion), len(text.joints)
     positions = np.zeros((count, frames, 3))
@@ -38,7 +39,7 @@ def forward_kinematics(text: BvhText) -> tuple[Array, Array]:
         turn = rotations[index]
         if joint.parent >= 0:
             turn[:] = rotations[joint.parent]
-            local = positions[joint.parent] + _rotated(turn, local)
+            local = positions[joint.parent] + rotate(turn, local)
         positions[index] = local
         for (axis, kind), value in zip(joint.channels, values.T, strict=True):
             if kind == "rotation":
@@ -47,10 +48,11 @@ def forward_kinematics(text: BvhText) -> tuple[Array, Array]:
 
 
 def _translation(joint: BvhJoint, values: Array) -> Array:
-    """Where a joint stands in its parent's frame (T, 3).
+    """Position of a joint in its parent's frame (T, 3).
 
-    Files disagree on what position channels below the root mean: some replace OFFSET, some add to
-    it, and many hold only zeros. Values that lie nearer to zero than to OFFSET add, others replace.
+    Files disagree on position channels below the root: in some they replace OFFSET, in some they
+    add to it, and in many they are zero. Values that lie nearer to zero than to OFFSET are added,
+    others replace it.
     """
     local = np.tile(np.array(joint.offset), (len(values), 1))
     channels = [place for place, (_, kind) in enumerate(joint.channels) if kind == "position"]
@@ -64,15 +66,8 @@ def _translation(joint: BvhJoint, values: Array) -> Array:
     return local
 
 
-def _rotated(rotation: Array, vector: Array) -> Array:
-    """Vectors (T, 3) turned by unit quaternions (T, 4)."""
-    axis, w = rotation[:, :3], rotation[:, 3:]
-    twice = 2.0 * np.cross(axis, vector)
-    return vector + w * twice + np.cross(axis, twice)
-
-
 def _turned_about(rotation: Array, axis: int, angle: Array) -> Array:
-    """`rotation` (T, 4) followed, in its own frame, by `angle` (T,) [rad] about one of its axes."""
+    """`rotation` (T, 4) followed, in its own frame, by `angle` (T,) [rad] about one axis."""
     sine, cosine = np.sin(angle / 2), np.cos(angle / 2)
     x, y, z, w = rotation.T
     by_axis = ((w, z, -y, -x), (-z, w, x, -y), (y, -x, w, -z))[axis]

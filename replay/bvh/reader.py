@@ -1,4 +1,4 @@
-"""BVH motion capture files as recordings: what the format leaves open is guessed and noted."""
+"""Read BVH files as recordings; unit, up axis and heading are guessed, and noted."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from devices.bodies.joint_labels import hips_joint, label_joints
 from devices.errors import InputError
@@ -24,10 +23,11 @@ from replay.orientation import (
     yaw_to_front,
 )
 from replay.recording import Recording
+from solvers.skeleton.quaternions import followed_by
 
 Array = NDArray[np.float64]
 
-_UNITS = (  # name, metres, the heights [m] of a person in the file for which it is believed
+_UNITS = (  # name, metres, and the plausible heights [m] of a person in that unit
     ("metres", 1.0, (1.2, 2.5)),
     ("centimetres", 0.01, (1.2, 2.5)),
     ("millimetres", 0.001, (1.2, 2.5)),
@@ -35,27 +35,27 @@ _UNITS = (  # name, metres, the heights [m] of a person in the file for which it
     ("decimetres", 0.1, (1.4, 2.1)),
     ("CMU units of 1/0.45 inch", 0.0254 / 0.45, (1.3, 2.1)),
 )
-_USUAL_HEIGHT = 1.7  # [m] of a person whose unit is none of these
-_CREATURE_SIZES = (0.3, 10.0)  # [m] believed of what is not a person
+_USUAL_HEIGHT = 1.7  # [m] of a person if no unit gives a plausible height
+_CREATURE_SIZES = (0.3, 10.0)  # [m] plausible sizes of other bodies
 
 
 def recognises_bvh(path: Path, head: bytes) -> bool:
-    """Whether the file begins with HIERARCHY, or at least is called .bvh."""
+    """Whether the file begins with HIERARCHY, or its name ends with .bvh."""
     start = head.replace(b"\x00", b"").lstrip(b"\xef\xbb\xbf\xff\xfe \t\r\n")
     return start[:9].upper() == b"HIERARCHY" or path.suffix.lower() == ".bvh"
 
 
 def read_bvh(path: Path) -> Recording:
-    """Read a BVH file: joints in metres, +Y up, facing +Z, from the file's free units and axes.
+    """Read a BVH file and convert it to metres, +Y up, facing +Z.
 
-    Rotations are joint to world and identity for the file's zero pose, up to the turn of the whole
-    recording. End sites become joints named after their parent with "_end". Rest positions are the
-    zero pose, upright by itself, or the first frame where the zero pose is no pose at all. Several
+    Rotations are joint to world and identity in the file's zero pose, up to the rotation of the
+    whole recording. End sites become joints with their parent's name and "_end". Rest positions are
+    the zero pose, levelled on its own, or the first frame if the zero pose is unusable. Several
     roots are joined under one. Unit, up axis and heading are guessed from the body (see
     `replay.orientation`), and noted.
 
     Raises:
-        InputError: not a BVH file, or one that cannot be understood; with the line.
+        InputError: the file is not BVH, or is damaged; the message gives the line.
     """
     text = read_bvh_text(path)
     notes = list(text.notes)
@@ -88,7 +88,7 @@ def read_bvh(path: Path) -> Recording:
 
 
 def _unique_names(joints: list[BvhJoint], notes: list[str]) -> list[str]:
-    """Every joint's name, end sites named after their parents, repeated ones numbered."""
+    """The names of all joints: end sites named after their parents, repeated names numbered."""
     taken = {joint.name for joint in joints if joint.name}
     given: Counter[str] = Counter()
     names: list[str] = []
@@ -119,7 +119,7 @@ def _free_name(name: str, names: list[str]) -> str:
 def _under_one_root(
     parents: list[int], positions: Array, rotations: Array, rest: Array
 ) -> tuple[Array, Array, Array]:
-    """The same with a joint put first, unturned, in the middle of the roots."""
+    """Add a joint, first in order and without rotation, in the middle of the roots."""
     roots = np.flatnonzero(np.array(parents) == -1)
     middle = positions[:, roots].mean(axis=1, keepdims=True)
     unturned = np.tile([0.0, 0.0, 0.0, 1.0], (len(positions), 1, 1))
@@ -139,7 +139,7 @@ def _canonical(
     up = up_axis(skeleton, parts, positions, rest)
     if up is None:
         up = np.array([0.0, 1.0, 0.0])
-        notes.append("up axis taken as +Y: no legs or head known by name")
+        notes.append("up axis taken as +Y: no legs or head are known by name")
     elif up[1] != 1.0:
         notes.append(f"up axis is {'-+'[int(up.sum() > 0)]}{'XYZ'[int(np.argmax(np.abs(up)))]}")
     person = stands_upright(skeleton, parts, positions, up)
@@ -150,15 +150,17 @@ def _canonical(
     moved = positions @ (scale * turn.T)
     yaw = yaw_to_front(skeleton, moved)
     if yaw is None:
-        notes.append("heading left as it is: no left and right hips or shoulders known by name")
+        notes.append("heading unchanged: no left and right hips or shoulders are known by name")
     else:
         moved, turn = moved @ yaw.T, yaw @ turn
     moved -= floor_and_start(moved, hips_joint(skeleton))
-    return moved, _turned(rotations, turn), _rest(skeleton, scale, moved, notes)
+    known: NDArray[np.bool_] = np.logical_and.reduce(np.isfinite(rotations), axis=2)
+    turned = followed_by(rotations, turn, known=known)
+    return moved, turned, _rest(skeleton, scale, moved, notes)
 
 
 def _metres(height: float | None, size: float, notes: list[str]) -> float:
-    """Metres of the file's unit, from a person's height in it, else from the skeleton's size."""
+    """Metres per unit of the file, from a person's height, else from the skeleton's size."""
     if height is None or height <= 0:
         for unit, metres, _ in _UNITS[:3]:
             if _CREATURE_SIZES[0] <= size * metres <= _CREATURE_SIZES[1]:
@@ -174,18 +176,8 @@ def _metres(height: float | None, size: float, notes: list[str]) -> float:
     return _USUAL_HEIGHT / height
 
 
-def _turned(rotations: Array, turn: Array) -> Array:
-    """Rotations (T, J, 4) with `turn` (3, 3) applied after them; NaN stays NaN."""
-    flat = rotations.reshape(-1, 4)
-    known = np.isfinite(flat).all(axis=1)
-    out = np.full_like(flat, np.nan)
-    if known.any():
-        out[known] = (Rotation.from_matrix(turn) * Rotation.from_quat(flat[known])).as_quat()
-    return out.reshape(rotations.shape)
-
-
 def _rest(skeleton: Skeleton, scale: float, moved: Array, notes: list[str]) -> Array:
-    """The zero pose made canonical by itself; the first whole frame where it does not stand."""
+    """The zero pose, levelled on its own; the first whole frame if the zero pose does not stand."""
     parts = label_joints(skeleton)
     y = np.array([0.0, 1.0, 0.0])
     rest = skeleton.rest_positions * scale
@@ -197,7 +189,7 @@ def _rest(skeleton: Skeleton, scale: float, moved: Array, notes: list[str]) -> A
         )
         whole = np.isfinite(moved).all(axis=(1, 2))
         if not stands and stands_upright(skeleton, parts, moved, y) and whole.any():
-            notes.append("the zero pose does not stand; the first frame serves as rest pose")
+            notes.append("the zero pose does not stand; the first frame is the rest pose")
             rest = moved[int(np.argmax(whole))]
     yaw = yaw_to_front(skeleton, rest[None])
     rest = rest if yaw is None else rest @ yaw.T

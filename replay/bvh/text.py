@@ -1,8 +1,8 @@
-"""The grammar of BVH: the hierarchy of joints and the table of channel values, as written.
+"""Parse BVH text: the hierarchy of joints and the table of channel values, without interpretation.
 
-The format has no standard; what is accepted here are the variants seen in the wild: any white space
-and case, a byte order mark, several roots, joints without end sites, names with blanks, colons and
-dots, frames cut over lines, a wrong frame count, a cut last frame, decimal commas.
+The format has no standard. The parser accepts the variants found in practice: any white space and
+case, a byte order mark, several roots, joints without end sites, names with blanks, colons and
+dots, frames split over lines, a wrong frame count, a truncated last frame, decimal commas.
 Source: Meredith and Maddock 2001, "Motion Capture File Formats Explained", section 2.
 """
 
@@ -22,7 +22,7 @@ from devices.errors import InputError
 MOST_BYTES = 512 * 2**20
 MOST_JOINTS = 10_000
 MOST_POSES = 20_000_000  # frames times joints
-_LARGEST = 1e7  # a length or an angle beyond this is no measurement
+_LARGEST = 1e7  # largest plausible length or angle
 _USUAL_FRAME_TIME = 1 / 30
 _CHANNEL = re.compile(r"([XYZ])(position|rotation|scale)$", re.IGNORECASE)
 _MOTION = re.compile(r"\}\s*MOTION\b", re.IGNORECASE)
@@ -34,13 +34,13 @@ _NOT_A_NUMBER = re.compile(r"[-+]?(?:1\.#\w+|nan\(\w*\))", re.IGNORECASE)  # C r
 
 @dataclass(slots=True)
 class BvhJoint:
-    """A joint or end site as declared.
+    """A joint or end site, as declared in the file.
 
     Attributes:
         name: as written; "" for an end site.
         parent: index of the joint that encloses it, -1 for a root.
         offset: from the parent at rest, in the file's unit.
-        channels: (axis 0 to 2, "position", "rotation" or "scale"), in the order of the columns.
+        channels: (axis 0 to 2, "position", "rotation" or "scale"), in column order.
     """
 
     name: str
@@ -51,13 +51,13 @@ class BvhJoint:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class BvhText:
-    """What a BVH file says, nothing interpreted.
+    """The contents of a BVH file, without interpretation.
 
     Attributes:
-        joints: in the order of the file, parents first; end sites among them.
+        joints: in the order of the file, parents first, with end sites.
         motion: (T, C) values of all channels; NaN where the file has no usable number.
         frame_time: [s] between frames, positive.
-        notes: what was mended.
+        notes: corrections that the parser made.
     """
 
     joints: list[BvhJoint]
@@ -70,21 +70,21 @@ def read_bvh_text(path: Path) -> BvhText:
     """Parse the file at `path`.
 
     Raises:
-        InputError: unreadable, too large, or not BVH; with the line where that shows.
+        InputError: the file is unreadable, too large or not BVH; with the line where known.
     """
     text = _decoded(path)
     motion = _MOTION.search(text)
     if not re.match(r"\s*HIERARCHY\b", text, re.IGNORECASE):
         raise InputError(f"{path}: not a BVH file, it does not begin with HIERARCHY")
     if motion is None:
-        raise InputError(f"{path}: no MOTION section after the hierarchy; the file may be cut")
+        raise InputError(
+            f"{path}: no MOTION section after the hierarchy; the file may be truncated"
+        )
     joints = _Hierarchy(path, text[: motion.start() + 1]).parse()
     timing = _TIMING.match(text, motion.end())
     line = 1 + text.count("\n", 0, motion.end())
     if timing is None:
-        raise InputError(
-            f"{path}, line {line}: after MOTION there should be 'Frames:' and 'Frame Time:'"
-        )
+        raise InputError(f"{path}, line {line}: expected 'Frames:' and 'Frame Time:' after MOTION")
     notes: list[str] = []
     columns = sum(len(joint.channels) for joint in joints)
     block = text[timing.end() :]
@@ -121,7 +121,7 @@ def _decoded(path: Path) -> str:
 
 
 class _Hierarchy:
-    """Reads the text before MOTION, word by word, remembering where it is for error messages."""
+    """Parses the text before MOTION word by word; error messages give the line."""
 
     def __init__(self, path: Path, text: str) -> None:
         self._path = path
@@ -189,7 +189,7 @@ class _Hierarchy:
         return word[1]
 
     def _name(self) -> str:
-        """The rest of the line, or up to a brace: names may hold blanks."""
+        """The rest of the line, or the text up to a brace: names may contain blanks."""
         name = re.compile(r"[^\n{}]*").match(self._text, self._at)
         assert name is not None
         self._at = name.end()
@@ -202,7 +202,7 @@ class _Hierarchy:
         except ValueError:
             self._fail(f"expected a number, got {word!r}")
         if not abs(number) < _LARGEST:
-            self._fail(f"{word} is no sensible length")
+            self._fail(f"{word} is not a plausible length")
         return number
 
     def _fail(self, what: str) -> NoReturn:
@@ -213,7 +213,7 @@ class _Hierarchy:
 def _table(
     path: Path, block: str, columns: int, first_line: int, notes: list[str]
 ) -> NDArray[np.float64]:
-    """The channel values (T, columns) of `block`, whose first line is `first_line` of the file."""
+    """The channel values (T, columns) of `block`, which starts in line `first_line` of the file."""
     if columns == 0:
         notes.append("no joint has a channel: one frame of the rest pose")
         return np.zeros((1, 0))
@@ -226,44 +226,44 @@ def _table(
         lines = [_NOT_A_NUMBER.sub("nan", line) for line in lines]
     end, frames = _whole_frames(path, counts, columns, first_line)
     if sum(counts[end:]):
-        notes.append("the last frame is cut and was left out")
+        notes.append("the last frame is truncated and was omitted")
     if _numbers(lines[end - 1]) is None and frames:
         end, frames = end - 1, frames - 1
         end -= next((n for n in range(end) if sum(counts[end - n : end]) % columns == 0), 0)
-        notes.append("the last frame is cut and was left out")
+        notes.append("the last frame is truncated and was omitted")
     values = _numbers("\n".join(lines[:end]))
     if values is None or values.size != sum(counts[:end]):
         bad = next(
             n for n in range(end) if (v := _numbers(lines[n])) is None or v.size != counts[n]
         )
-        raise InputError(f"{path}, line {first_line + bad}: something that is no number")
+        raise InputError(f"{path}, line {first_line + bad}: expected numbers only")
     if frames == 0:
         raise InputError(f"{path}: no whole frame after 'Frame Time:'")
     unusable = ~(np.abs(values) < _LARGEST)
     if unusable.any():
-        notes.append(f"{np.count_nonzero(unusable)} values are no finite, sensible numbers")
+        notes.append(f"{np.count_nonzero(unusable)} values are not finite, plausible numbers")
         values[unusable] = np.nan
     return values.reshape(frames, columns)
 
 
 def _whole_frames(path: Path, counts: list[int], columns: int, first_line: int) -> tuple[int, int]:
-    """How many lines hold how many whole frames; a frame may go over lines but ends with one."""
-    held, end, frames = 0, 0, 0
+    """How many lines hold how many whole frames; a frame may span lines but ends with a line."""
+    count_so_far, end, frames = 0, 0, 0
     for line, count in enumerate(counts):
-        held += count
-        if held > columns:
+        count_so_far += count
+        if count_so_far > columns:
             begins = next(n for n in range(end, line + 1) if counts[n])
             raise InputError(
-                f"{path}, line {first_line + begins}: the frame here should have {columns} values, "
-                f"as the hierarchy declares, but line {first_line + line} brings it to {held}"
+                f"{path}, line {first_line + begins}: expected {columns} values for this frame, "
+                f"as the hierarchy declares, but line {first_line + line} makes it {count_so_far}"
             )
-        if held == columns:
-            held, end, frames = 0, line + 1, frames + 1
+        if count_so_far == columns:
+            count_so_far, end, frames = 0, line + 1, frames + 1
     return end, frames
 
 
 def _numbers(text: str) -> NDArray[np.float64] | None:
-    """All numbers of `text`, or None where something else stands between them."""
+    """All numbers of `text`, or None if it contains anything else."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
@@ -281,6 +281,6 @@ def _frame_time(word: str, notes: list[str]) -> float:
         notes.append(f"frame time {word} was taken as frames per second")
         return 1 / seconds
     if not 1e-5 <= seconds < 10.0:
-        notes.append(f"frame time {word!r} is unusable, taken as 1/30 s")
+        notes.append(f"frame time {word!r} is unusable; 1/30 s is assumed")
         return _USUAL_FRAME_TIME
     return seconds

@@ -1,8 +1,8 @@
-"""The text of BVH files: a hierarchy at rest, and a line of channels for every frame.
+"""Write BVH text: the hierarchy at rest, and one line of channels per frame.
 
-+Y up. The root has six channels, position and then rotation in the order Z, X, Y; all other joints
-have the three rotations, as every program reads them, but for those that slide, which have all six.
-The format names no unit.
++Y up. The root has six channels, position and then rotation in the order Z, X, Y. All other joints
+have the three rotations, which every program reads; sliding joints have all six channels. The
+format does not state a unit.
 Source: Meredith and Maddock 2001, "Motion Capture File Formats Explained", section 2.
 """
 
@@ -20,10 +20,10 @@ from devices.skeleton import Skeleton
 Array = NDArray[np.float64]
 
 UNITS = {"cm": 100.0, "m": 1.0, "mm": 1000.0, "in": 1 / 0.0254}
-"""What a length may be written in, and how many of it make a metre."""
+"""Units of length in the file, and the number of them in a metre."""
 
 LONE_STEP = 1 / 30  # [s] of a motion of one frame
-_TIP = 0.25  # an end site's offset, as a part of the bone before it
+_TIP = 0.25  # length of an added end site, relative to the bone before it
 _PLACES = "Xposition Yposition Zposition"
 _TURNS = "Zrotation Xrotation Yrotation"
 
@@ -40,18 +40,17 @@ def write_bvh(
 ) -> None:
     """Write one performer's motion.
 
-    A last joint that is called after its parent with "_end", as `replay.bvh.reader` calls end
-    sites, is written as the end site that it was; any other is given one, a quarter of its bone
-    further on.
+    A leaf joint with its parent's name and "_end", the name that `replay.bvh.reader` gives to end
+    sites, is written as an end site. Every other leaf gets one, a quarter of its bone further on.
 
     Args:
         file: open for writing.
-        skeleton: its rest pose is that of no rotation.
-        root: (T, 3) [m] where the root is.
+        skeleton: its rest pose has zero rotations.
+        root: (T, 3) [m] positions of the root.
         rotations: (T, J, 3, 3) world, since the rest pose.
-        slides: for joints that no bone holds, where each is (T, 3) [m] in its parent's frame.
+        slides: positions (T, 3) [m] in the parent's frame of joints without a rigid bone.
         step: between two frames [s].
-        per_metre: lengths are written times this.
+        per_metre: factor from metres to the file's unit.
     """
     places = {joint: per_metre * way for joint, way in (slides or {}).items()}
     places[skeleton.root] = per_metre * root
@@ -62,7 +61,7 @@ def write_bvh(
 
 
 def _channels(skeleton: Skeleton, places: Mapping[int, Array], rotations: Array) -> Array:
-    """All channels (T, C) in the order of the hierarchy: the file's unit, degrees."""
+    """All channels (T, C) in hierarchy order: the file's unit, degrees."""
     ends = _end_sites(skeleton) - set(places)
     columns = []
     for joint in _depth_first(skeleton):
@@ -77,9 +76,9 @@ def _channels(skeleton: Skeleton, places: Mapping[int, Array], rotations: Array)
 
 
 def _euler_zxy(matrices: Array) -> Array:
-    """Angles (T, 3) [degrees] z, x, y with R = Rz Rx Ry, without jumps from frame to frame."""
+    """Angles (T, 3) [degrees] z, x, y with R = Rz Rx Ry, continuous from frame to frame."""
     sine = np.clip(matrices[:, 2, 1], -1, 1)
-    locked = np.abs(sine) > 1 - 1e-12  # z and y turn about one axis: all of it goes to z
+    locked = np.abs(sine) > 1 - 1e-12  # z and y rotate about one axis: z takes the whole angle
     z = np.where(
         locked,
         np.arctan2(matrices[:, 1, 0], matrices[:, 0, 0]),
@@ -92,7 +91,7 @@ def _euler_zxy(matrices: Array) -> Array:
 
 
 def _depth_first(skeleton: Skeleton) -> list[int]:
-    """Joints in the order in which the hierarchy names them."""
+    """The joints in hierarchy order."""
     order, waiting = [], [skeleton.root]
     while waiting:
         order.append(joint := waiting.pop())
@@ -101,7 +100,7 @@ def _depth_first(skeleton: Skeleton) -> list[int]:
 
 
 def _end_sites(skeleton: Skeleton) -> set[int]:
-    """Joints that say no more than where the bone of their parent ends."""
+    """Joints that only mark the end of their parent's bone."""
     children = np.bincount(skeleton.parents[skeleton.parents >= 0], minlength=len(skeleton.names))
     return {
         joint
@@ -113,7 +112,7 @@ def _end_sites(skeleton: Skeleton) -> set[int]:
 
 
 def _plain_names(skeleton: Skeleton) -> list[str]:
-    """Names without blanks or braces, which end a name in BVH, still unique."""
+    """Unique names without blanks or braces, which would end a name in BVH."""
     names: list[str] = []
     for joint, name in enumerate(skeleton.names):
         plain = re.sub(r"[\s{}]+", "_", name.strip()) or "joint"
@@ -124,7 +123,7 @@ def _plain_names(skeleton: Skeleton) -> list[str]:
 
 
 def _hierarchy(skeleton: Skeleton, placed: set[int], per_metre: float) -> str:
-    """The text of all joints; those `placed` have position channels.
+    """The text of all joints; those in `placed` have position channels.
 
     The root's offset is 0, since its position channels are absolute.
     """

@@ -1,1 +1,1 @@
-"""Recorded Kinect bodies in the text formats of public data sets."""
+"""Readers of recorded Kinect bodies in the text formats of public data sets."""

@@ -1,4 +1,4 @@
-"""Azure Kinect CSV files with one column a joint and "x y z" in each cell, as GymTrainer writes.
+"""Read Azure Kinect CSV files with one column per joint and "x y z" in each cell (GymTrainer).
 
 Source: carlge/Azure-kinect-GymTrainer. A header names the joints; camera metres, Y down; no time
 and no confidence.
@@ -12,23 +12,24 @@ import numpy as np
 
 from devices.errors import InputError
 from devices.kinect.joints import AZURE_TO_WORLD, KINECT_AZURE
-from replay.kinect.files import KINECT_RATE, camera_recording, first_rows, read_lines
+from replay.kinect.camera_recording import KINECT_RATE, camera_recording
+from replay.kinect.text_rows import first_rows, read_lines
 from replay.recording import Recording
 
-_MILLIMETRES_FROM = 50.0  # a body further away than this many units is not measured in metres
+_MILLIMETRES_FROM = 50.0  # units of distance from which the unit cannot be metres
 
 
 def recognises_azure_csv(_path: Path, head: bytes) -> bool:
-    """Whether the first line names the joints of Azure Kinect, a column each."""
+    """Whether the first line names the joints of Azure Kinect, one per column."""
     rows = first_rows(head, ",")
     return bool(rows) and {"Pelvis", "SpineNavel", "SpineChest"} <= _columns(rows[0]).keys()
 
 
 def read_azure_csv(path: Path) -> Recording:
-    """Read an Azure Kinect CSV, every line a frame at 30 a second; millimetres are told by size.
+    """Read an Azure Kinect CSV, one frame per line at 30 per second; millimetres are detected.
 
     Raises:
-        InputError: a joint without a column, or a cell that is not three numbers.
+        InputError: a joint has no column, or a cell is not three numbers.
     """
     notes: list[str] = ["no times in the file: 30 frames a second"]
     lines = [(at, line) for at, line in enumerate(read_lines(path), 1) if line.strip()]
@@ -42,7 +43,7 @@ def read_azure_csv(path: Path) -> Recording:
             frames.append(_joints(line.split(","), columns))
         except (ValueError, IndexError) as error:
             if frames and at == lines[-1][0]:
-                notes.append("the last line is cut and was left out")
+                notes.append("the last line is truncated and was omitted")
                 continue
             raise InputError(f"{path}, line {at}: expected cells of three numbers") from error
     if not frames:

@@ -1,4 +1,4 @@
-"""Kinect v2 CSV files of the Labanotation Suite: a line a frame, ticks and 25 joints with states.
+"""Read Kinect v2 CSV files of the Labanotation Suite: ticks and 25 joints with states per line.
 
 Source: microsoft/LabanotationSuite, KinectReader. Camera metres, joints in the order of SDK 2.0,
 ticks of 100 ns, no header, a comma after the last field.
@@ -13,14 +13,8 @@ from numpy.typing import NDArray
 
 from devices.errors import InputError
 from devices.kinect.joints import CONFIDENCE_OF_STATE, KINECT_TO_WORLD, KINECT_V2
-from replay.kinect.files import (
-    are_numbers,
-    camera_recording,
-    first_rows,
-    number_rows,
-    read_lines,
-    rising,
-)
+from replay.kinect.camera_recording import camera_recording, rising
+from replay.kinect.text_rows import are_numbers, first_rows, number_rows, read_lines
 from replay.recording import Recording
 
 _COLUMNS = 1 + 4 * len(KINECT_V2.names)
@@ -28,7 +22,7 @@ _TICK = 1e-7  # [s]
 
 
 def recognises_laban(_path: Path, head: bytes) -> bool:
-    """Whether the file has lines of 101 numbers with commas between."""
+    """Whether the file has lines of 101 numbers separated by commas."""
     rows = first_rows(head, ",")
     return bool(rows) and all(
         len(row) in (_COLUMNS, _COLUMNS + 1)
@@ -42,7 +36,7 @@ def read_laban(path: Path) -> Recording:
     """Read a Labanotation Suite CSV; tracked joints have confidence 1, inferred ones 0.5.
 
     Raises:
-        InputError: see `replay.kinect.files.number_rows`, or a state that Kinect does not have.
+        InputError: see `number_rows`, or a tracking state is invalid.
     """
     notes: list[str] = []
     rows = number_rows(path, read_lines(path), _COLUMNS, notes, separator=",")
@@ -59,10 +53,10 @@ def read_laban(path: Path) -> Recording:
 
 
 def confidence_of_states(path: Path, states: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Confidence of Kinect's tracking states, any shape.
+    """Return the confidence of Kinect's tracking states, any shape.
 
     Raises:
-        InputError: a number that is no state.
+        InputError: a number is not a state.
     """
     known = np.isin(states, np.arange(len(CONFIDENCE_OF_STATE)))
     if not known.all():

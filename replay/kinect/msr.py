@@ -1,9 +1,9 @@
-"""MSR Action3D skeleton files: Kinect v1, 20 lines a frame of "x y z confidence", camera metres.
+"""Read MSR Action3D skeleton files: Kinect v1, 20 lines of "x y z confidence" per frame, metres.
 
 Source: Li, Zhang, Liu 2010, "Action Recognition Based on a Bag of 3D Points"; the files in
-real-world coordinates. The joints come in an order of their own, not that of the Kinect SDK. It was
-read off the poses: the moving arm of the one-armed actions, which the subjects were told to do with
-the right one, is 2-9-11-13 counted from 1, feet are nearer to the camera than ankles.
+real-world coordinates. The joints have an order of their own, not that of the Kinect SDK. It was
+derived from the poses: the moving arm of the one-armed actions, performed with the right arm, is
+2-9-11-13 counted from 1, and feet are nearer to the camera than ankles.
 """
 
 from __future__ import annotations
@@ -13,13 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from devices.kinect.joints import KINECT_TO_WORLD, KINECT_V1
-from replay.kinect.files import (
-    are_numbers,
-    camera_recording,
-    first_rows,
-    number_rows,
-    read_lines,
-)
+from replay.kinect.camera_recording import camera_recording
+from replay.kinect.text_rows import are_numbers, first_rows, number_rows, read_lines
 from replay.recording import Recording
 
 _ORDER = (
@@ -27,7 +22,7 @@ _ORDER = (
     *("HipCenter", "ElbowLeft", "ElbowRight", "WristLeft", "WristRight", "HandLeft", "HandRight"),
     *("KneeLeft", "KneeRight", "AnkleLeft", "AnkleRight", "FootLeft", "FootRight", "Head"),
 )
-_RATE = 15.0  # [Hz] the data set's; its files have no time
+_RATE = 15.0  # [Hz] of the data set; its files have no time
 
 
 def recognises_msr(_path: Path, head: bytes) -> bool:
@@ -39,20 +34,21 @@ def recognises_msr(_path: Path, head: bytes) -> bool:
 
 
 def read_msr(path: Path) -> Recording:
-    """Read an MSR Action3D file, every frame, at 15 frames a second.
+    """Read every frame of an MSR Action3D file at 15 frames per second.
 
-    Its confidence is how visible the joint was: 0 marks a joint that the tracker inferred, as it
-    always does along the spine, and maps to 0.5, what Kinect's "inferred" means elsewhere; 1 to 1.
+    The file's confidence is the visibility of the joint: 0 marks a joint that the tracker inferred,
+    as it always does along the spine. It maps to 0.5, the usual confidence of inferred joints; 1
+    maps to 1.
 
     Raises:
-        InputError: see `replay.kinect.files.number_rows`.
+        InputError: see `number_rows`.
     """
     notes: list[str] = ["no times in the file: 15 frames a second"]
     rows = number_rows(path, read_lines(path), 4, notes)
     joints = len(_ORDER)
     frames = len(rows) // joints
     if len(rows) % joints:
-        notes.append("the last frame is cut and was left out")
+        notes.append("the last frame is truncated and was omitted")
     table = rows[: frames * joints].reshape(frames, joints, 4)
     table = table[:, [_ORDER.index(name) for name in KINECT_V1.names]]
     visible = np.clip(np.nan_to_num(table[..., 3]), 0.0, 1.0)

@@ -1,4 +1,4 @@
-"""NTU RGB+D .skeleton files: Kinect v2, several bodies a frame.
+"""Read NTU RGB+D .skeleton files: Kinect v2, several bodies per frame.
 
 Source: Shahroudy et al. 2016, "NTU RGB+D"; the layout is that of its read_skeleton_file: number of
 frames; each frame a number of bodies; each body a line of identity and hand states, a number of
@@ -16,15 +16,16 @@ from numpy.typing import NDArray
 
 from devices.errors import InputError
 from devices.kinect.joints import KINECT_TO_WORLD, KINECT_V2
-from replay.kinect.files import KINECT_RATE, are_numbers, camera_recording, first_rows, read_lines
+from replay.kinect.camera_recording import KINECT_RATE, camera_recording
 from replay.kinect.laban import confidence_of_states
+from replay.kinect.text_rows import are_numbers, first_rows, read_lines
 from replay.recording import Recording
 
 _JOINTS = len(KINECT_V2.names)
 _JOINT_FIELDS = 12
 _BODY_FIELDS = 10
 _LONGEST_COUNT = 20  # characters; Python refuses to convert numbers of thousands
-_MOST_BODIES = 6  # that a Kinect v2 follows at a time
+_MOST_BODIES = 6  # tracked at a time by a Kinect v2
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,7 +36,7 @@ class _Body:
 
 
 def recognises_ntu(path: Path, head: bytes) -> bool:
-    """Whether the file opens with the numbers of frames and bodies and a body's ten fields."""
+    """Whether the file begins with the numbers of frames and bodies and a body's ten fields."""
     rows = first_rows(head, None)
     counts = [row[0] for row in rows[:2] if len(row) == 1 and row[0].isdecimal()]
     if len(counts) < 2:
@@ -46,13 +47,13 @@ def recognises_ntu(path: Path, head: bytes) -> bool:
 
 
 def read_ntu(path: Path) -> Recording:
-    """Read an NTU file at 30 frames a second: a frame of the recording for each body in each.
+    """Read an NTU file at 30 frames per second; each body of a frame is a frame of the recording.
 
-    Kinect's 64-bit body identities become performers 0, 1, ... in the order in which they appear.
-    Rotations belong to the bone that ends at the joint; NaN where Kinect gives none.
+    Kinect's 64-bit body identities become performers 0, 1, ... in order of appearance. Rotations
+    belong to the bone that ends at the joint; NaN where Kinect gives none.
 
     Raises:
-        InputError: a line that is not what the layout asks for, or no body at all.
+        InputError: a line does not follow the layout, or there is no body.
     """
     notes: list[str] = ["no times in the file: 30 frames a second"]
     bodies = _bodies(path, notes)
@@ -98,7 +99,7 @@ def _bodies(path: Path, notes: list[str]) -> list[_Body]:
             notes.append(f"declares {declared} frames, holds {frame} whole ones")
             break
     if next(rows, None) is not None:
-        notes.append(f"lines after the {declared} declared frames were left out")
+        notes.append(f"lines after the {declared} declared frames were omitted")
     return bodies
 
 

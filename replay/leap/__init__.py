@@ -1,1 +1,1 @@
-"""Recordings of the Leap Motion's messages."""
+"""Read recordings of the Leap Motion's messages."""

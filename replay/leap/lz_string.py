@@ -1,8 +1,8 @@
-"""Text compressed by lz-string (`compressToBase64`), as the LeapJS recorder stores it.
+"""Decompress lz-string text (`compressToBase64`), the format of the LeapJS recorder.
 
-An LZ78 code: each number either is an entry of the dictionary or announces a new character; it is
-as wide as the dictionary's size. The bits lie in the base64 digits from the highest, the numbers
-from the lowest, so each digit is turned round once and all is read as one stream from the lowest.
+An LZ78 code: each number is an entry of the dictionary or announces a new character; its width
+follows the dictionary's size. The bits lie in the base64 digits from the highest, the numbers from
+the lowest, so each digit is reversed once and all are read as one stream from the lowest bit.
 """
 
 from __future__ import annotations
@@ -10,15 +10,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 _DIGITS = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"
-_TURNED = {digit: int(f"{value:06b}"[::-1], 2) for value, digit in enumerate(_DIGITS)}
+_REVERSED = {digit: int(f"{value:06b}"[::-1], 2) for value, digit in enumerate(_DIGITS)}
 _NEW_8_BITS, _NEW_16_BITS, _END = 0, 1, 2
 
 
 def lz_pieces(base64: bytes) -> Iterator[str]:
-    """The pieces of the decompressed text, one by one, so that the caller may stop at a bound.
+    """Yield the pieces of the decompressed text, so that the caller may stop at a bound.
 
     Raises:
-        ValueError: a character that is no base64 digit, a number that means nothing, or no end.
+        ValueError: a character is not a base64 digit, a number is invalid, or the end is missing.
     """
     read = _bits(base64)
     dictionary = ["", "", ""]  # the three numbers above
@@ -30,7 +30,7 @@ def lz_pieces(base64: bytes) -> Iterator[str]:
         if number < len(dictionary):
             piece = dictionary[number]
         elif number == len(dictionary) and previous:
-            piece = previous + previous[0]  # the entry that is about to be made
+            piece = previous + previous[0]  # the entry that is made next
         else:
             raise ValueError(f"number {number} is not in a dictionary of {len(dictionary)}")
         yield piece
@@ -40,21 +40,21 @@ def lz_pieces(base64: bytes) -> Iterator[str]:
 
 
 def _bits(base64: bytes) -> Callable[[int], int]:
-    """A function that reads the next `count` bits as a number."""
+    """Return a function that reads the next `count` bits as a number."""
     digits = iter(base64)
-    waiting, held = 0, 0
+    pending, width = 0, 0
 
     def read(count: int) -> int:
-        nonlocal waiting, held
-        while held < count:
-            turned = _TURNED.get(next(digits, -1))
-            if turned is None:
-                raise ValueError("the compressed text breaks off, or holds what is no base64")
-            waiting |= turned << held
-            held += 6
-        number = waiting & ((1 << count) - 1)
-        waiting >>= count
-        held -= count
+        nonlocal pending, width
+        while width < count:
+            digit = _REVERSED.get(next(digits, -1))
+            if digit is None:
+                raise ValueError("the compressed text is truncated or not base64")
+            pending |= digit << width
+            width += 6
+        number = pending & ((1 << count) - 1)
+        pending >>= count
+        width -= count
         return number
 
     return read

@@ -1,13 +1,13 @@
-"""Recordings of the Leap Motion's WebSocket messages.
+"""Read recordings of the Leap Motion's WebSocket messages.
 
-Three kinds of file hold the same messages: one JSON object a line (a header with the protocol's
-version first), one JSON document with a list of frames (LeapJS Playback, also its packed form, in
-which the first frame is the scheme of the others), and that document compressed by lz-string.
-Protocol 6 gives every finger's bones and says which hand is which; protocols before it give palms
-and finger tips only (`devices.leap.tips` then finds out which is which).
+Three kinds of file hold the same messages: one JSON object per line (first a header with the
+protocol version), one JSON document with a list of frames (LeapJS Playback, also in its packed
+form, in which the first frame is the scheme of the others), and that document compressed by
+lz-string. Protocol 6 gives the bones of every finger and the side of each hand; earlier protocols
+give only palms and finger tips (`devices.leap.tips` assigns them).
 
-Millimetres in device axes become metres as `devices.leap.joints` says. A frame without a hand is
-kept, at the ends of a recording too, with every joint NaN and confidence 0.
+Millimetres in device axes become metres as in `devices.leap.joints`. A frame without a hand is
+kept, also at the ends of a recording, with every joint NaN and confidence 0.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ Array = NDArray[np.float64]
 MAX_BYTES = 128 << 20  # of a JSON document, decompressed
 MAX_LINE = 4 << 20
 MAX_FRAMES = 1_000_000
-USUAL_RATE = 110.0  # frames/s, where nothing in the file says
+USUAL_RATE = 110.0  # frames/s if the file does not state a rate
 
 _MARKS = (b'"pointables"', b'"interactionBox"', b'"palmPosition"', b'"LeapJS')
 _LZ_BEGINNINGS = ('{"frames"', '{"metadata"')
@@ -56,7 +56,7 @@ def recognises_leap(path: Path, head: bytes) -> bool:
 
 
 def read_leap(path: Path) -> Recording:
-    """The recording of Leap messages at `path`.
+    """Read the Leap messages at `path`.
 
     Raises:
         InputError: the file cannot be read, is damaged, or shows no hand in any frame.
@@ -67,9 +67,11 @@ def read_leap(path: Path) -> Recording:
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror or error}") from error
     except (ValueError, TypeError, KeyError, RecursionError) as error:
-        raise InputError(f"{path} is a damaged or cut Leap recording: {_short(error)}") from error
+        raise InputError(
+            f"{path} is a damaged or truncated Leap recording: {_short(error)}"
+        ) from error
     if not any(hand.joints for frame in frames for hand in frame.hands):
-        raise InputError(f"{path} is a Leap recording, but no hand is seen in any frame of it")
+        raise InputError(f"{path} is a Leap recording, but no frame shows a hand")
     times = _times(frames, notes)
     tracks = follow_hands(frames)
     if any(hand.tips for track in tracks.values() for hand in track if hand):
@@ -123,7 +125,7 @@ def _line_messages(file: Iterable[bytes], notes: list[str]) -> Iterator[dict[str
                 raise ValueError(f"it holds more than {MAX_FRAMES} frames")
             yield message
     if bad:
-        notes.append(f"{bad} lines are no messages (a recorder that was stopped cuts the last one)")
+        notes.append(f"{bad} lines are not messages (a stopped recorder truncates the last one)")
 
 
 def _decompress(text: bytes) -> str:
@@ -188,7 +190,7 @@ def _unpack(scheme: Any, values: Any) -> dict[str, Any]:
 
 
 def _times(frames: Sequence[LeapFrame], notes: list[str]) -> Array:
-    """(T,) [s] from the device's clock; from the stated rate where a time is missing."""
+    """Times (T,) [s] from the device's clock; from the stated rate if a time is missing."""
     stamps = [frame.timestamp for frame in frames]
     known = [stamp for stamp in stamps if stamp is not None]
     if len(known) < len(frames):
@@ -197,33 +199,33 @@ def _times(frames: Sequence[LeapFrame], notes: list[str]) -> Array:
         notes.append(f"times are missing; {rate:.1f} frames a second are assumed")
         return np.arange(len(frames)) / rate
     if any(later < earlier for earlier, later in pairwise(known)):
-        notes.append("the device's clock goes back; those frames are given the time before")
+        notes.append("the device's clock goes back; those frames get the time before")
     return (np.maximum.accumulate(np.array(known)) - known[0]) * 1e-6
 
 
 def follow_hands(frames: Sequence[LeapFrame]) -> dict[str, list[Hand | None]]:
-    """The hand of every frame, or None, for each side; for the side "" where no two are ever seen.
+    """Return each side's hand in every frame, or None; side "" if two hands never appear together.
 
-    Ids change after a loss. A hand keeps its side while it keeps its id; a new id takes the side
-    that the device names, else the free one, else (both are new) the one on which it is.
+    Ids change when a hand is lost. A hand keeps its side while it keeps its id. A new id takes the
+    side that the device gives, else the free side, else (both are new) the side it is on.
     """
     two = any(len({hand.side or hand.id for hand in frame.hands}) > 1 for frame in frames)
     sides = SIDES if two else ("",)
     tracks: dict[str, list[Hand | None]] = {side: [] for side in sides}
-    held: dict[str, int] = {}
+    ids: dict[str, int] = {}
     for frame in frames:
-        now = _sides(frame.hands, sides, held)
-        held = {side: hand.id for side, hand in now.items()}
+        now = _sides(frame.hands, sides, ids)
+        ids = {side: hand.id for side, hand in now.items()}
         for side in sides:
             tracks[side].append(now.get(side))
     return tracks
 
 
-def _sides(hands: list[Hand], sides: tuple[str, ...], held: dict[str, int]) -> dict[str, Hand]:
-    """Which hand of a frame is on which side; `held` has the ids of the frame before."""
+def _sides(hands: list[Hand], sides: tuple[str, ...], previous: dict[str, int]) -> dict[str, Hand]:
+    """The hand of each side in a frame; `previous` has the ids of the frame before."""
     found: dict[str, Hand] = {}
-    ids = {hand_id: side for side, hand_id in held.items()}
-    # Those that were there before come first, then the surest; unnamed ones from left to right.
+    ids = {hand_id: side for side, hand_id in previous.items()}
+    # Present hands come first, then the more confident; others from left to right.
     for hand in sorted(
         hands, key=lambda h: (h.id not in ids, -h.confidence, float(h.joints[PALM][0]))
     ):

@@ -1,1 +1,1 @@
-"""Bunraku's own recordings: MCAP files that survive a crash."""
+"""Read and write Bunraku's own recordings: MCAP files that survive a crash."""

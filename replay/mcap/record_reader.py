@@ -1,8 +1,8 @@
-"""MCAP records from bytes that may be cut or damaged, with every size bounded.
+"""Read MCAP records from bytes that may be truncated or damaged, with every size bounded.
 
-The library's own readers stop at the first fault (`StreamReader`) or give nothing without a summary
-(`SeekingReader`), and believe any length that they are told. This walk believes none: it yields
-what is whole, and says where and why it stopped. Specification: https://mcap.dev/spec
+The library's own readers stop at the first fault (`StreamReader`) or read nothing without a summary
+(`SeekingReader`), and trust every stated length. These functions yield intact records, and report
+where and why they stop. Specification: https://mcap.dev/spec
 """
 
 from __future__ import annotations
@@ -38,22 +38,22 @@ _READERS: dict[int, Callable[[ReadDataStream], Record]] = {
 
 
 class DamagedRecordError(Exception):
-    """A record that cannot be read: cut short, of an impossible length, or with a wrong CRC."""
+    """A record that cannot be read: truncated, of an impossible length, or with a wrong CRC."""
 
 
 @dataclass(frozen=True, slots=True)
 class Fault:
-    """Where in the file something could not be read, and why."""
+    """The offset of an unreadable part of a file, and the reason."""
 
     offset: int
     reason: str
 
 
 def parse_record(opcode: int, body: bytes) -> Record | None:
-    """One record from its body, or None for a kind that a reader of frames has no use for.
+    """Return a record from its body, or None for a kind that a reader of frames does not need.
 
     Raises:
-        DamagedRecordError: the body does not hold what the opcode promises.
+        DamagedRecordError: the body does not match the opcode.
     """
     stream = ReadDataStream(BytesIO(body))
     try:
@@ -67,10 +67,10 @@ def parse_record(opcode: int, body: bytes) -> Record | None:
 
 
 def walk(file: IO[bytes], end: int) -> Iterator[tuple[int, Record | Fault]]:
-    """The records of `file` from where it stands to `end`, each with its offset.
+    """Yield the records of `file` from its current position to `end`, each with its offset.
 
-    A record that is damaged inside is given as a `Fault` and passed over; one whose length cannot
-    be true ends the walk with a `Fault`, since nothing after it can be found.
+    A record with a damaged body yields a `Fault` and is skipped. A record with an impossible length
+    yields a `Fault` and ends the iteration, since the next record cannot be found.
     """
     while (offset := file.tell()) < end:
         head = file.read(9)
@@ -93,15 +93,15 @@ def walk(file: IO[bytes], end: int) -> Iterator[tuple[int, Record | Fault]]:
 
 
 def unpack_chunk(chunk: Chunk) -> bytes:
-    """The records inside `chunk`, decompressed, their CRC checked.
+    """Return the records inside `chunk`, decompressed, after a check of their CRC.
 
     Raises:
-        DamagedRecordError: the CRC is wrong, the data do not decompress to the size that the chunk
-            states, or that size is over the limit.
+        DamagedRecordError: the CRC is wrong, the data do not decompress to the stated size, or that
+            size exceeds the limit.
     """
     size = int(chunk.uncompressed_size)
     if size > MAX_RECORD:
-        raise DamagedRecordError(f"a chunk claims {size} bytes")
+        raise DamagedRecordError(f"a chunk states {size} bytes")
     try:
         if chunk.compression == "zstd":
             data = zstandard.ZstdDecompressor().stream_reader(chunk.data).read(size + 1)
@@ -110,9 +110,7 @@ def unpack_chunk(chunk: Chunk) -> bytes:
         elif chunk.compression == "":
             data = chunk.data
         else:
-            raise DamagedRecordError(
-                f"a chunk is compressed by {chunk.compression!r}, unknown here"
-            )
+            raise DamagedRecordError(f"a chunk has the unknown compression {chunk.compression!r}")
     except (zstandard.ZstdError, RuntimeError, EOFError) as error:
         raise DamagedRecordError("a chunk does not decompress") from error
     if len(data) != size or (chunk.uncompressed_crc and zlib.crc32(data) != chunk.uncompressed_crc):
@@ -121,7 +119,7 @@ def unpack_chunk(chunk: Chunk) -> bytes:
 
 
 def chunk_indexes(file: IO[bytes]) -> list[ChunkIndex] | None:
-    """The chunk index in the summary of a finished file, or None where there is no whole one."""
+    """Return the chunk index in the summary of a finished file, or None if it is incomplete."""
     size = file.seek(0, 2)
     if size < len(MAGIC) * 2 + FOOTER_BYTES:
         return None

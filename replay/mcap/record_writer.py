@@ -1,9 +1,8 @@
-"""An MCAP file that grows by whole records only, and whose index takes no memory to speak of.
+"""Write MCAP records to a file that grows by whole records only, with a compact index in memory.
 
-The library's own writer keeps some 800 bytes for every chunk until the end, has no way to hand on
-what is in an unfinished chunk, and leaves half a record behind when the disk is full. Here the
-index is kept as the bytes that it becomes, and a record that did not fit is cut off again.
-Specification: https://mcap.dev/spec
+The library's own writer keeps some 800 bytes per chunk until the end, cannot flush an unfinished
+chunk, and leaves half a record behind when the disk is full. This writer keeps the index as the
+bytes that it becomes, and truncates a record that did not fit. Specification: https://mcap.dev/spec
 """
 
 from __future__ import annotations
@@ -39,20 +38,20 @@ from replay.mcap.record_reader import MAGIC
 
 CHUNK_BYTES = 1 << 20
 _MESSAGE = struct.Struct("<BQHIQQ")  # its head: opcode, size, channel, sequence, two times
-_OPCODE_AND_SIZE = 9  # bytes, which a record's size leaves out
-_ZSTD_LEVEL = 1  # on frames in JSON both smaller and faster than the usual 3
+_OPCODE_AND_SIZE = 9  # bytes that a record's size does not include
+_ZSTD_LEVEL = 1  # on frames in JSON both smaller and faster than the default 3
 
 
 class McapRecordWriter:
     """Writes records to a new MCAP file: metadata at once, messages in chunks compressed by zstd.
 
-    Nothing but `flush`, `metadata`, `finish` and a chunk that is full (1 MiB) writes to the file.
+    Only `flush`, `metadata`, `finish` and a full chunk (1 MiB) write to the file.
 
     Args:
-        path: is replaced.
+        path: of the file; an existing file is replaced.
 
     Raises:
-        OSError: the file cannot be made or written; so do all methods.
+        OSError: the file cannot be created or written; the same holds for all methods.
     """
 
     def __init__(self, path: Path) -> None:
@@ -67,8 +66,8 @@ class McapRecordWriter:
         self._chunk_index = bytearray()
         self._chunks = self._metadatas = 0
         self._times: tuple[int, int] | None = None  # of all messages, first and last [ns]
-        # The records of the chunk that is being filled, and room for more. One room for all
-        # chunks: buffers of ever other sizes would leave holes in the memory of a long show.
+        # The records of the current chunk, in one buffer for all chunks: buffers of varying sizes
+        # would fragment the memory of a long show.
         self._room = bytearray(2 * CHUNK_BYTES)
         self._filled = 0
         self._entries: dict[int, list[tuple[int, int]]] = {}
@@ -81,12 +80,12 @@ class McapRecordWriter:
 
     @property
     def descriptor(self) -> int:
-        """Number of the open file, for `os.fsync`."""
+        """File descriptor of the open file, for `os.fsync`."""
         return self._file.fileno()
 
     @property
     def regular(self) -> bool:
-        """Whether it is a file on a disk, and not a device or a pipe."""
+        """Whether it is a file on a disk, not a device or a pipe."""
         return self._regular
 
     def metadata(self, name: str, data: dict[str, str]) -> None:
@@ -99,14 +98,14 @@ class McapRecordWriter:
         self._metadatas += 1
 
     def schema(self, name: str, text: str) -> int:
-        """Declare a JSON schema; its number."""
+        """Declare a JSON schema; return its number."""
         number = len(self._schemas) + 1
         self._schemas.append(Schema(number, text.encode(), "jsonschema", name))
         self._append(_bytes_of(self._schemas[-1]))
         return number
 
     def channel(self, topic: str, schema: int) -> int:
-        """Open a channel of JSON messages; its number."""
+        """Open a channel of JSON messages; return its number."""
         number = len(self._channels) + 1
         self._channels.append(Channel(number, topic, "json", {}, schema))
         self._append(_bytes_of(self._channels[-1]))
@@ -125,7 +124,7 @@ class McapRecordWriter:
             self.flush()
 
     def flush(self) -> None:
-        """Hand all messages to the system as one chunk, with its index."""
+        """Pass all messages to the system as one chunk, with its index."""
         if not self._entries:
             return
         size, entries = self._filled, self._entries
@@ -159,7 +158,7 @@ class McapRecordWriter:
         )
 
     def finish(self) -> None:
-        """Write what is left, the summary and the footer."""
+        """Write the remaining chunk, the summary and the footer."""
         self.flush()
         end = _bytes_of(DataEnd(data_section_crc=0))  # 0: not computed
         summary_start = self._offset + len(end)
@@ -202,11 +201,11 @@ class McapRecordWriter:
 
     def _append(self, record: bytes) -> None:
         end = self._filled + len(record)
-        self._room[self._filled : end] = record  # which makes more room where there is too little
+        self._room[self._filled : end] = record  # grows the buffer if necessary
         self._filled = end
 
     def _write(self, data: bytes) -> None:
-        """All of `data`, or nothing of it and an OSError."""
+        """Write all of `data`, or nothing of it and raise OSError."""
         view = memoryview(data)
         try:
             while view:

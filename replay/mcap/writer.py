@@ -1,4 +1,4 @@
-"""Frames to an MCAP file, such that a crash costs less than a second; see `replay.mcap.reader`."""
+"""Write frames to an MCAP file so that a crash loses less than a second."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from typing import Self
 
 from devices.errors import InputError
 from devices.skeleton import Skeleton, SkeletonFrame
-from replay.mcap.reader import (
+from replay.mcap.frame_json import (
     FRAME_SCHEMA,
     PERFORMER_TOPIC,
     SKELETON_NAME,
@@ -32,23 +32,23 @@ SYNC_SECONDS = 0.5
 class McapWriter:
     """Writes frames to a native recording; a context manager.
 
-    What has been written is handed to the system every half second (of `clock`, or of the
-    performers' time, whichever is sooner) and when 1 MiB has gathered; and to the disk from a
-    thread of its own, so that no frame waits for it.
+    Written frames are passed to the system every half second (of `clock`, or of the performers'
+    time, whichever is sooner) and after each 1 MiB; a separate thread flushes them to the disk, so
+    that no frame waits for it.
 
     Args:
-        path: is replaced.
+        path: of the file; an existing file is replaced.
         skeleton: of every frame.
-        source: what is known of where the frames come from, as short texts.
+        source: facts about the origin of the frames, as short texts.
         clock: host monotonic time [s].
 
     Attributes:
-        frames: frames written so far.
-        safe: how many of them were handed to the system, which no crash of ours can take back.
-        moved: whether the file no longer lies at `path`; it is written all the same.
+        frames: number of frames written so far.
+        safe: number of them that were passed to the system, and so survive a crash of ours.
+        moved: whether the file no longer lies at `path`; it is written nevertheless.
 
     Raises:
-        InputError: the file cannot be made or written; the message names it.
+        InputError: the file cannot be created or written; the message names it.
     """
 
     def __init__(
@@ -85,8 +85,8 @@ class McapWriter:
 
         Args:
             frame: of the skeleton.
-            sequence: its number among all that came, so that a reader sees which are missing; by
-                default, and where no frame is lost, how many were written before.
+            sequence: number of the frame among all that came, so that a reader detects missing
+                frames; by default, when no frame is lost, the number of frames written before.
 
         Raises:
             ValueError: the frame's joints are not the skeleton's, or its time is not finite.
@@ -105,7 +105,7 @@ class McapWriter:
             self.sync()
 
     def sync(self) -> None:
-        """Hand everything to the system now, and to the disk soon.
+        """Pass everything to the system now, and to the disk soon.
 
         Raises:
             InputError: the disk is full or the file is gone, now or at an earlier call.
@@ -117,7 +117,7 @@ class McapWriter:
         self.moved = not self._in_place()
         if os.fstat(self._sink.descriptor).st_nlink == 0:
             raise InputError(
-                f"cannot write {self.path}: it was deleted while it was being recorded"
+                f"cannot write {self.path}: it was deleted during the recording; record again"
             )
         if self._disk is not None:
             if not self._disk.done():
@@ -145,7 +145,7 @@ class McapWriter:
         self.close()
 
     def _begin(self, source: dict[str, str]) -> None:
-        """Header, source and skeleton, on their way to the disk at once, and the schemas."""
+        """Write header, source and skeleton, which reach the disk at once, and the schemas."""
         if source:
             self._sink.metadata(SOURCE_NAME, source)
         self._sink.metadata(SKELETON_NAME, {"json": encode_skeleton(self.skeleton)})
@@ -202,8 +202,8 @@ class McapWriter:
 
 
 def _sync_folder(path: Path) -> None:
-    """Bring the new file's name to the disk: without it a power cut leaves the data nameless."""
-    if os.name == "nt":  # folders cannot be opened there, and are journalled
+    """Flush the new file's directory entry: a power cut would otherwise lose the name."""
+    if os.name == "nt":  # folders cannot be opened there; they are journalled
         return
     with suppress(OSError):  # some network file systems cannot
         folder = os.open(path.absolute().parent, os.O_RDONLY)
@@ -214,5 +214,5 @@ def _sync_folder(path: Path) -> None:
 
 
 def _nanoseconds(seconds: float) -> int:
-    """MCAP's clock: a whole number from 0 to 2^64; the exact seconds are in the message."""
+    """MCAP's time: an integer from 0 to 2^64; the exact seconds are in the message."""
     return min(max(round(seconds * 1e9), 0), (1 << 64) - 1)

@@ -1,1 +1,1 @@
-"""Recorded MediaPipe landmarks."""
+"""Read recorded MediaPipe landmarks."""

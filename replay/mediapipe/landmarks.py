@@ -1,4 +1,4 @@
-"""One performer's MediaPipe landmarks, of the world or of an image, made into joints in metres."""
+"""Convert one performer's MediaPipe landmarks, world or image, to joints in metres."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 from devices.mediapipe.joints import HAND_BONES, HAND_LANDMARKS, MIDDLES, PARENTS, SIDES
 
 Array = NDArray[np.float64]
-# A landmark's track is (T, 4): x, y, z in MediaPipe's axes, and its confidence; where it was not
-# seen NaN, NaN, NaN, 0.
+# A landmark's track is (T, 4): x, y, z in MediaPipe's axes, and its confidence; NaN, NaN, NaN, 0
+# where it was not seen.
 Tracks = Mapping[str, Array]
 
-SHOULDERS = 0.36  # [m] of a grown-up
+SHOULDERS = 0.36  # [m] of an adult
 HAND = 0.09  # [m] from the wrist to the first joint of the middle finger
-FARTHEST = 1e7  # in whatever unit the landmarks come
+FARTHEST = 1e7  # in the unit of the landmarks
 
 _LIMBS = [
     (f"{side}_{start}", f"{side}_{end}")
@@ -34,14 +34,14 @@ _PALM = ("wrist", "middle_finger_mcp")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PersonLandmarks:
-    """One performer's landmarks, T frames.
+    """One performer's landmarks in T frames.
 
     Attributes:
         times: (T,) [s].
-        performer: who it is.
-        world: the pose [m], from the middle of the hips, by joint name; empty if there is none.
-        image: the pose in the image [pixels, z too as far as its scale is known].
-        hands: for each side the hand's landmarks in the same units as `image`.
+        performer: number of the performer.
+        world: pose [m] from the middle of the hips, by joint name; empty if there is none.
+        image: pose in the image [pixels; z as far as its scale is known].
+        hands: for each side the hand's landmarks in the units of `image`.
     """
 
     times: Array
@@ -52,7 +52,7 @@ class PersonLandmarks:
 
 
 def track(points: Array, confidence: Array) -> Array:
-    """(T, 4) track of a landmark from its points (T, 3) and confidence (T,)."""
+    """Return the track (T, 4) of a landmark from its points (T, 3) and confidence (T,)."""
     found = np.concatenate([points, np.clip(np.nan_to_num(confidence), 0.0, 1.0)[:, None]], axis=1)
     near: NDArray[np.bool_] = np.abs(points) <= FARTHEST  # False for NaN
     found[~np.logical_and.reduce(near, axis=1) | (found[:, 3] <= 0)] = (np.nan,) * 3 + (0.0,)
@@ -60,12 +60,12 @@ def track(points: Array, confidence: Array) -> Array:
 
 
 def seen(tracks: Tracks) -> dict[str, Array]:
-    """Those landmarks that are seen in any frame."""
+    """Return the landmarks that are seen in any frame."""
     return {name: found for name, found in tracks.items() if (found[:, 3] > 0).any()}
 
 
 def joints_in_metres(person: PersonLandmarks) -> dict[str, Array]:
-    """Tracks [m, MediaPipe's axes] of the joints of `devices.mediapipe.joints` that were seen."""
+    """Return the tracks [m, MediaPipe's axes] of the seen joints of `devices.mediapipe.joints`."""
     world, image = seen(person.world), _with_depth(seen(person.image), _LIMBS)
     hands = {
         side: _with_depth(seen(person.hands[side]), HAND_BONES.items()) for side in person.hands
@@ -91,7 +91,7 @@ def joints_in_metres(person: PersonLandmarks) -> dict[str, Array]:
 
 
 def between(left: Array, right: Array) -> Array:
-    """The track of the point halfway between two landmarks; as sure as the less sure of them."""
+    """Return the track halfway between two landmarks, with the lower of their confidences."""
     return track(0.5 * (left[:, :3] + right[:, :3]), np.minimum(left[:, 3], right[:, 3]))
 
 
@@ -100,10 +100,10 @@ def _scaled(found: Array, factor: float) -> Array:
 
 
 def _with_depth(tracks: Tracks, bones: Iterable[tuple[str, str]]) -> dict[str, Array]:
-    """The landmarks with their depth multiplied so that the bones keep their length best.
+    """Scale the depth of the landmarks so that bone lengths vary least.
 
-    For each bone l^2 = (dx^2 + dy^2) + a dz^2 shall not change from frame to frame: the a of least
-    squares over all bones, kept between flat and the scale that the landmarks come with.
+    For each bone l^2 = (dx^2 + dy^2) + a dz^2 should be constant over the frames: `a` is the
+    least-squares solution over all bones, limited to [0, 1].
     """
     product = square = 0.0
     for start, end in bones:
@@ -121,7 +121,7 @@ def _with_depth(tracks: Tracks, bones: Iterable[tuple[str, str]]) -> dict[str, A
 
 
 def _metres_a_pixel(world: Tracks, image: Tracks, hands: Mapping[str, Tracks]) -> float:
-    """The scale of the image: from the same pose in both, else from shoulders or a hand."""
+    """Metres per pixel: from a pose that is in both, else from shoulders or a hand."""
     both = [name for name in image if name in world]
     if len(both) > 1:
         sizes = [_spread([tracks[name] for name in both]) for tracks in (world, image)]
@@ -136,12 +136,12 @@ def _metres_a_pixel(world: Tracks, image: Tracks, hands: Mapping[str, Tracks]) -
             lengths = np.hypot(ends[:, 0], ends[:, 1])
             lengths = lengths[np.isfinite(lengths)]
             if len(lengths) and (widest := float(np.percentile(lengths, 90))) > 0:
-                return metres / widest  # turned away they look shorter, never longer
+                return metres / widest  # turned away they appear shorter, never longer
     return 1.0
 
 
 def _spread(tracks: Sequence[Array]) -> Array:
-    """(T,) root mean square distance of landmarks from their mean, across the image."""
+    """Root mean square distance (T,) of landmarks from their mean, in the image plane."""
     points = np.stack([found[:, :2] for found in tracks])
     deviations = points - points.mean(axis=0)
     spread: Array = np.sqrt((deviations**2).sum(axis=2).mean(axis=0))

@@ -1,8 +1,8 @@
-"""The binary .pose files of the pose-format library, versions 0.1 and 0.2.
+"""Parse binary .pose files of the pose-format library, versions 0.1 and 0.2.
 
-A header names components (each a list of named points), then the body holds all coordinates of all
-frames, then all confidences, as float32. Version 0.1 counts frames in 16 bits, which long files
-overflow: there the size of the file says how many there are.
+A header names components (each a list of named points); then follow all coordinates of all frames,
+then all confidences, as float32. Version 0.1 counts frames in 16 bits, which long files overflow:
+the file size gives the number there.
 Source: sign-language-processing/pose, docs/specs/v0.1.md and v0.2.md.
 """
 
@@ -24,13 +24,13 @@ _HEADER = struct.Struct("<fHHHH")
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PoseFile:
-    """What a .pose file holds.
+    """The contents of a .pose file.
 
     Attributes:
         size: width and height of the image [pixels].
-        rate: frames a second.
-        components: each component's point names, by its name, in the order of the points.
-        points: (T, people, N, 3) in the image's axes; z is 0 where the file has none; not masked.
+        rate: frames per second.
+        components: point names by component, in the order of the points.
+        points: (T, people, N, 3) in the image's axes; z is 0 if the file has none; not masked.
         confidence: (T, people, N); 0 where a point was not seen.
     """
 
@@ -42,7 +42,7 @@ class PoseFile:
 
 
 class _Cursor:
-    """Reads on from one place of some bytes; running over the end is an InputError."""
+    """Reads successive values from bytes; reading beyond the end is an InputError."""
 
     def __init__(self, data: bytes) -> None:
         self.data = data
@@ -74,17 +74,17 @@ def has_pose_header(head: bytes) -> bool:
     return known and len(name) == length and name.isascii() and name.decode("latin-1").isprintable()
 
 
-@np.errstate(invalid="ignore")  # whatever a damaged file holds
+@np.errstate(invalid="ignore")  # values of a damaged file
 def parse_pose(data: bytes) -> PoseFile:
-    """The contents of a .pose file.
+    """Return the contents of a .pose file.
 
     Raises:
-        InputError: of another version, cut short before the first frame, or with impossible counts.
+        InputError: another version, truncated before the first frame, or impossible counts.
     """
     cursor = _Cursor(data)
     version, width, height, _, count = cursor.take(_HEADER.format)
     if round(version, 3) not in (0.1, 0.2):
-        raise InputError(f"its version is {version:.3g}; 0.1 and 0.2 can be read")
+        raise InputError(f"its version is {version:.3g}; only 0.1 and 0.2 can be read")
     components, dimensions = _components(cursor, int(count))
     newer = round(version, 3) == 0.2
     rate, frames, people = cursor.take("<fIH" if newer else "<HHH")
@@ -94,8 +94,8 @@ def parse_pose(data: bytes) -> PoseFile:
         raise InputError("it holds no people or no points, or its frame rate is damaged")
     there = (len(data) - cursor.at) // (4 * stride)
     if newer and there < frames:
-        # Confidences follow all the coordinates: without the end, none of them can be found.
-        raise InputError(f"it is cut short: {int(frames)} frames are promised, {there} are there")
+        # Confidences follow all coordinates: in a truncated file they cannot be found.
+        raise InputError(f"it is truncated: it states {int(frames)} frames and holds {there}")
     total = int(frames) if newer else there
     if total == 0 or total * stride > MAX_VALUES:
         raise InputError(f"it holds {total} frames of {points} points, which is none or too many")
@@ -114,7 +114,7 @@ def parse_pose(data: bytes) -> PoseFile:
 
 
 def _components(cursor: _Cursor, count: int) -> tuple[dict[str, list[str]], int]:
-    """Point names by component, and how many coordinates each point has."""
+    """Point names by component, and the number of coordinates per point."""
     components: dict[str, list[str]] = {}
     dimensions = 0
     for _ in range(count):
@@ -124,7 +124,9 @@ def _components(cursor: _Cursor, count: int) -> tuple[dict[str, list[str]], int]
         cursor.take(f"<{2 * limbs + 3 * colours}H")
         dimensions = max(dimensions, len(layout) - 1)
         if not layout.startswith("XY") or not layout.endswith("C"):
-            raise InputError(f"its points are laid out as {layout!r}; XYC and XYZC can be read")
+            raise InputError(
+                f"its points have the layout {layout!r}; only XYC and XYZC can be read"
+            )
     if len(components) != count:
         raise InputError("two of its components have the same name")
     return components, dimensions

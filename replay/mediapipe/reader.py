@@ -1,9 +1,9 @@
-"""Recordings of MediaPipe landmarks: .pose files, tables (CSV) and JSON.
+"""Read recordings of MediaPipe landmarks: .pose files, tables (CSV) and JSON.
 
-World landmarks are taken where there are some. Landmarks of the image are brought to metres by the
-width of the shoulders, and their depth, whose scale MediaPipe leaves open, to that at which bones
-keep their length (`replay.mediapipe.landmarks`). Hands, which are always of the image, are moved
-to the wrists of the body. Without world landmarks the origin is where the root is first seen.
+World landmarks are preferred. Image landmarks are converted to metres by the width of the
+shoulders; their depth, which has no defined scale, is scaled so that bones keep their length
+(`replay.mediapipe.landmarks`). Hands, which are always in image coordinates, are moved to the
+wrists of the body. Without world landmarks the origin is the first position of the root.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from replay.recording import Recording
 Array = NDArray[np.float64]
 
 MAX_FILE = 512 << 20
-WORLD_WIDEST = 3.0  # [m] shoulders further apart are not in metres
+WORLD_WIDEST = 3.0  # [m] width of shoulders beyond which the unit is not metres
 USUAL_RATE = 25.0
 _NOSE_TIP = ("1", "4")
 
@@ -43,7 +43,7 @@ def recognises_mediapipe(path: Path, head: bytes) -> bool:
 
 
 def read_mediapipe(path: Path) -> Recording:
-    """The recording of landmarks at `path`.
+    """Read the landmarks at `path`.
 
     Raises:
         InputError: the file cannot be read, is damaged, or holds no landmark of MediaPipe's.
@@ -62,9 +62,7 @@ def read_mediapipe(path: Path) -> Recording:
             people, notes = parse_landmark_text(data)
         return _recording(people, notes)
     except InputError as error:
-        raise InputError(
-            f"{path} is no recording of landmarks that can be read: {error}"
-        ) from error
+        raise InputError(f"{path} is not a readable recording of landmarks: {error}") from error
 
 
 def _people(file: PoseFile) -> tuple[list[PersonLandmarks], list[str]]:
@@ -84,7 +82,7 @@ def _people(file: PoseFile) -> tuple[list[PersonLandmarks], list[str]]:
 
 
 def _by_component(file: PoseFile, person: int) -> dict[str, dict[str, Array]]:
-    """Tracks by component and by the name of the point; depth, too, in pixels of the width."""
+    """Tracks by component and point name; depth is converted to pixels of the width."""
     width = max(file.size[0], 1)
     found: dict[str, dict[str, Array]] = {}
     first = 0
@@ -103,8 +101,8 @@ def _by_component(file: PoseFile, person: int) -> dict[str, dict[str, Array]]:
 
 
 def _world(tracks: Mapping[str, Array], size: tuple[int, int]) -> dict[str, Array]:
-    """World landmarks in metres: pose-format multiplies x and y by the image's size, as if they
-    were of the image, in the versions seen; one that did not is known by its size."""
+    """World landmarks in metres. Known versions of pose-format multiply x and y by the image size,
+    as for image landmarks; a file without that is detected by its size."""
     width, height = max(size[0], 1), max(size[1], 1)
     shoulders = [tracks[n] for n in ("LEFT_SHOULDER", "RIGHT_SHOULDER") if n in tracks]
     factors = np.array([1.0, 1.0, 1.0 / width, 1.0])
@@ -140,7 +138,7 @@ def _known(tracks: Tracks, names: Sequence[str]) -> dict[str, Array]:
 
 
 def _nose(face: Mapping[str, Array], image: Mapping[str, Array]) -> Array:
-    """The nose of a pose that was stored without: the face's tip or middle, over the shoulders."""
+    """The nose of a pose stored without one: the face's tip or middle, at the shoulders' depth."""
     points = [face[name] for name in _NOSE_TIP if name in face] or list(face.values())
     nose = points[0] if len(points) < 3 else np.mean(points, axis=0)
     shoulders = [image[name] for name in ("left_shoulder", "right_shoulder") if name in image]
@@ -173,7 +171,7 @@ def _recording(people: Sequence[PersonLandmarks], notes: Sequence[str]) -> Recor
 
 
 def _frames(skeleton: Skeleton, person: PersonLandmarks, joints: Mapping[str, Array]) -> Array:
-    """(T, J, 4) positions and confidence of one performer."""
+    """Positions and confidence (T, J, 4) of one performer."""
     frames = np.full((len(person.times), len(skeleton.names), 4), np.nan)
     frames[..., 3] = 0.0
     for name, found in joints.items():

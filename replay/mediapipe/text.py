@@ -1,10 +1,10 @@
-"""MediaPipe landmarks as text: CSV tables and JSON, as people write them down.
+"""Parse MediaPipe landmarks in text files: CSV tables and JSON in several common layouts.
 
-Tables: one row a landmark (columns such as frame, time, landmark, x, y, z, visibility), or one row
-a frame (columns such as left_wrist_x or x15). JSON: one object a line or a list of them, each with
-"pose_world_landmarks", "pose_landmarks", "left_hand_landmarks", "right_hand_landmarks" (any may
-miss, camelCase too; of several people the first is taken), each landmark {x, y, z, visibility} or
-a list of those numbers.
+Tables: one row per landmark (columns such as frame, time, landmark, x, y, z, visibility), or one
+row per frame (columns such as left_wrist_x or x15). JSON: one object per line or a list of them,
+each with "pose_world_landmarks", "pose_landmarks", "left_hand_landmarks", "right_hand_landmarks"
+(all optional, camelCase too; of several people the first is read), each landmark
+{x, y, z, visibility} or a list of those numbers.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ Point = tuple[float, float, float, float]  # x, y, z, confidence
 MAX_FRAMES = 1_000_000
 USUAL_RATE = 30.0
 USUAL_ASPECT = 16.0 / 9.0
-WORLD_CENTRE = 0.05  # [m] the middle of the hips is the origin of world landmarks
+WORLD_CENTRE = 0.05  # [m] largest distance of the hips' middle from the origin of world landmarks
 
 _TIMES = {"t": 1.0, "t_s": 1.0, "time": 1.0, "time_s": 1.0, "seconds": 1.0, "timestamp": 1.0}
 _TIMES |= {"timestamp_s": 1.0, "t_ms": 1e-3, "time_ms": 1e-3, "timestamp_ms": 1e-3}
@@ -83,10 +83,10 @@ def has_landmark_text(head: bytes) -> bool:
 
 
 def parse_landmark_text(data: bytes) -> tuple[list[PersonLandmarks], list[str]]:
-    """The people (one) in a table or JSON, and what was assumed about them.
+    """Return the people (one) in a table or JSON, and notes on the assumptions made.
 
     Raises:
-        InputError: no landmark of MediaPipe's can be found in it.
+        InputError: the text names no landmark of MediaPipe's.
     """
     text = data.decode("utf-8-sig", errors="replace").lstrip()
     try:
@@ -101,7 +101,7 @@ def parse_landmark_text(data: bytes) -> tuple[list[PersonLandmarks], list[str]]:
     world, image = groups["world"], groups["image"]
     if not world and _in_metres(image):
         world, image = image, {}
-        notes.append("landmarks are taken to be of the world: the hips are at the origin")
+        notes.append("landmarks are assumed to be world landmarks: the hips are at the origin")
     in_image = [image, groups["left"], groups["right"]]
     if any(in_image) and _normalised(in_image):
         in_image = [_stretched(tracks) for tracks in in_image]
@@ -126,7 +126,7 @@ def _pose_name(text: str) -> str | None:
 
 
 def _long_axes(header: Sequence[str]) -> dict[str, list[int]]:
-    """Columns of x, y, z of each group in a table of one row a landmark."""
+    """Columns of x, y, z of each group in a table with one row per landmark."""
     found: dict[str, list[int]] = {}
     for group, patterns in _AXES.items():
         for pattern in patterns:
@@ -139,7 +139,7 @@ def _long_axes(header: Sequence[str]) -> dict[str, list[int]]:
 
 
 def _wide(header: Sequence[str]) -> dict[tuple[str, str], int]:
-    """Column by landmark and axis (x, y, z, v) in a table of one row a frame."""
+    """Column by landmark and axis (x, y, z, v) in a table with one row per frame."""
     found: dict[tuple[str, str], int] = {}
     for column, cell in enumerate(header):
         matches = (pattern.match(cell) for pattern in _WIDE)
@@ -235,7 +235,7 @@ def _json_lines(text: str) -> Iterator[Any]:
         try:
             yield json.loads(line)
         except ValueError:
-            continue  # a recorder that was stopped cuts its last line
+            continue  # a stopped recorder truncates its last line
 
 
 def _json_moment(item: Mapping[str, Any]) -> _Moment:
@@ -254,7 +254,7 @@ def _json_moment(item: Mapping[str, Any]) -> _Moment:
 
 
 def _json_points(found: Any, labels: Sequence[str]) -> dict[str, Point]:
-    """Landmarks from a list of them, or of people's lists of them."""
+    """Landmarks from a list of them, or from a list of people's lists."""
     if isinstance(found, dict):
         found = found.get("landmark", found.get("landmarks"))
     while isinstance(found, list) and len(found) and len(found) < len(labels):
@@ -284,7 +284,7 @@ def _moment_times(moments: Sequence[_Moment], notes: list[str]) -> Array:
         return np.arange(len(moments)) / USUAL_RATE
     times = np.array(known, dtype=np.float64)
     if (np.diff(times) < 0).any():
-        notes.append("times go back; those frames are given the time before")
+        notes.append("times go back; those frames get the time before")
     return np.maximum.accumulate(times)
 
 
@@ -308,7 +308,7 @@ def _in_metres(tracks: Mapping[str, Array]) -> bool:
 
 
 def _normalised(groups: Sequence[Mapping[str, Array]]) -> bool:
-    """Whether most landmarks lie where an image whose sides are 1 has them."""
+    """Whether most landmarks lie within an image whose sides are 1."""
     values = np.concatenate([c[:, :2].ravel() for tracks in groups for c in tracks.values()])
     values = np.abs(values[np.isfinite(values)])
     return len(values) > 0 and float(np.median(values)) < 2.0

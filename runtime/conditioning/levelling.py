@@ -12,10 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from replay.orientation import upright
 from runtime.conditioning.body_anatomy import BodyAnatomy
 from solvers.kernels.compiled import kernel
-from solvers.signal.floor_plane import FloorFit, FloorState
+from solvers.signal.floor_plane import FloorFit, FloorState, upright
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]

@@ -72,6 +72,19 @@ class FloorFit:
         return a, b, middle_y - a * middle_x - b * middle_z
 
 
+def upright(axis: Array) -> Array:
+    """Return the smallest rotation (3, 3) that carries the unit vector `axis`, not -Y, to +Y."""
+    x, y, z = axis
+    # Rodrigues' formula about axis x Y, expanded; 1 + y > 0 as the axis does not point down.
+    return np.array(
+        [
+            [1 - x * x / (1 + y), -x, -x * z / (1 + y)],
+            [x, y, z],
+            [-x * z / (1 + y), -z, 1 - z * z / (1 + y)],
+        ]
+    )
+
+
 @kernel
 def _add(normal: Array, right: Array, points: Array, keep: float, dt: float) -> None:
     normal *= keep

@@ -50,7 +50,7 @@ def test_a_hidden_joint_is_held_relative_to_its_parent() -> None:
 
 
 def test_then_it_turns_to_rest_with_the_performers_own_bone_length() -> None:
-    filler = Filler(ARM, hold=0.5, ease=1.0)
+    filler = Filler(ARM, keep=0.5, ease=1.0)
     filler.fill(frame(0.0, UP))
     half = filler.fill(frame(1.0, without(UP, "hand"))).positions[0]
     np.testing.assert_allclose(half, [2 * math.sqrt(0.5), 2 + 2 * math.sqrt(0.5), 0.0])

@@ -118,7 +118,7 @@ def test_what_a_slow_disk_cannot_take_is_counted_told_and_seen_in_the_file(tmp_p
     disk.join()
     assert numbers(path) == [*range(sent - 1), sent + 30]
     assert recorder.frames == sent
-    assert read_mcap(path).notes[0].startswith("31 frames came but are not in the file")
+    assert read_mcap(path).notes[0].startswith("31 recorded frames are not in the file")
 
 
 def test_a_patient_source_waits_and_loses_nothing(tmp_path: Path) -> None:
@@ -208,7 +208,7 @@ def test_a_full_disk_ends_a_recording_with_one_line_and_a_file_that_opens(tmp_pa
     assert told.startswith(f"bunraku: {len(recording)} frames in {path}, ")
     assert len(recording) > 0
     assert len(recording.notes) == 1, "no half record is left at the end"
-    assert "never finished" in recording.notes[0]
+    assert "not finished" in recording.notes[0]
     assert path.stat().st_size <= 400_000
     for performer in range(4):  # in order and without a hole, up to there
         assert np.diff(recording.of(performer).times) == pytest.approx(1 / RATE)

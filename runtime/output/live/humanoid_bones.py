@@ -14,12 +14,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.bodies.forward_kinematics import conjugate, multiply, rotate
 from devices.bodies.humanoid import FINGERS, SEGMENTS, SIDES, humanoid_skeleton
 from devices.bodies.joint_labels import label_joints
 from devices.bodies.joint_names import BodyPart, Kind, Side
 from devices.errors import InputError
 from devices.skeleton import Skeleton
+from solvers.skeleton.quaternions import conjugate, multiply, rotate
 
 Array = NDArray[np.float64]
 Vector = Sequence[float]

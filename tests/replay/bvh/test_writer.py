@@ -17,7 +17,7 @@ from devices.builtin.gestures import RATE
 from devices.builtin.motions import motion_clip
 from devices.errors import InputError
 from devices.skeleton import Skeleton
-from replay.bvh.export import BvhMade, write_bvh_recording
+from replay.bvh.export import BvhSummary, write_bvh_recording
 from replay.bvh.reader import read_bvh
 from replay.bvh.writer import UNITS
 from replay.even_times import even_times
@@ -46,7 +46,7 @@ def recording(
     )
 
 
-def written(made_of: Recording, **options: object) -> tuple[str, BvhMade]:
+def written(made_of: Recording, **options: object) -> tuple[str, BvhSummary]:
     file = io.StringIO()
     made = write_bvh_recording(file, made_of, **options)
     return file.getvalue(), made
@@ -242,9 +242,9 @@ def test_even_times_lie_within_and_never_grow_beyond_all_bounds(
 
 def test_more_frames_than_a_file_can_hold_are_refused() -> None:
     act = motion_clip("show")
-    with pytest.raises(InputError, match="too many; ask for a lower rate"):
+    with pytest.raises(InputError, match="too many; give a lower rate"):
         written(recording(act.skeleton, act.positions[:91]), rate=1e6)
-    with pytest.raises(InputError, match="too many; ask for a lower rate"):
+    with pytest.raises(InputError, match="too many; give a lower rate"):
         even_times(np.array([0.0, 1e9]), 1000.0)
 
 

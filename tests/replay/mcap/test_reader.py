@@ -159,7 +159,7 @@ def test_numbers_that_are_left_out_are_frames_that_were_lost(tmp_path: Path) -> 
     with McapWriter(tmp_path / "a.mcap", ARM) as writer:
         for number in (0, 1, 5, 6, 8):
             writer.write(arm_frame(number), number)
-    assert read_mcap(tmp_path / "a.mcap").notes[0].startswith("4 frames came but are not")
+    assert read_mcap(tmp_path / "a.mcap").notes[0].startswith("4 recorded frames are not")
 
 
 def test_a_finished_file_is_entered_at_any_time(tmp_path: Path) -> None:
@@ -193,7 +193,7 @@ def test_at_most_a_second_is_missing_while_a_recording_runs(tmp_path: Path) -> N
         recording = read_mcap(unfinished(tmp_path, count))
         assert len(recording) > count - 30
         assert_frame(recording, len(recording) - 1, arm_frame(len(recording) - 1))
-        assert "never finished" in recording.notes[-1]
+        assert "not finished" in recording.notes[-1]
 
 
 def test_a_slow_stream_is_synced_by_the_clock(tmp_path: Path) -> None:
@@ -357,7 +357,7 @@ def test_a_digit_that_flipped_is_found_by_the_checksum(tmp_path: Path) -> None:
 
 
 def test_a_file_of_another_program_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="without a skeleton"):
+    with pytest.raises(InputError, match="without a Bunraku skeleton"):
         read_mcap(foreign(tmp_path / "a.mcap", b"{}", skeleton=False))
 
 

@@ -103,7 +103,7 @@ def test_each_of_several_performers_has_a_bvh_file(
     assert main(["convert", "a.mcap", "c.mcap", "--performer", "2"]) == 0
     assert set(read_recording(Path("c.mcap")).performers) == {2}
     capsys.readouterr()
-    assert "there are: 0, 1, 2" in refused(capsys, "a.mcap", "d.mcap", "--performer", "3")
+    assert "known performers: 0, 1, 2" in refused(capsys, "a.mcap", "d.mcap", "--performer", "3")
 
 
 def test_nothing_is_overwritten_silently(
@@ -133,7 +133,7 @@ def test_nothing_is_overwritten_silently(
         (["notes.txt", "b.bvh"], "notes.txt is not a recording"),
         (["a.mcap", "b.mcap", "--unit", "cm"], "--unit says nothing about a .mcap file"),
         (["a.mcap", "b.csv", "--rate", "30"], "--rate says nothing about a .csv file"),
-        (["a.mcap", "b.bvh", "--rate", "1e7"], "too many; ask for a lower rate"),
+        (["a.mcap", "b.bvh", "--rate", "1e7"], "too many; give a lower rate"),
         (["a.mcap", "b.bvh", "--unit", "parsec"], "--unit"),
         (["a.mcap", "b.bvh", "--performer", "-1"], "--performer"),
     ],
@@ -159,12 +159,12 @@ def test_a_cut_recording_is_mended(
     whole = recorded(Path("a.mcap")).read_bytes()
     Path("cut.mcap").write_bytes(whole[: len(whole) * 3 // 4])
     assert main(["convert", "cut.mcap", "mended.mcap"]) == 0
-    assert "never finished" in capsys.readouterr().out
+    assert "not finished" in capsys.readouterr().out
     cut, mended = read_recording(Path("cut.mcap")), read_recording(Path("mended.mcap"))
     assert 0 < len(cut) < FRAMES
     assert_same(cut, mended)
     assert mended.notes == ()
-    assert "never finished" in mended.source["notes"]
+    assert "not finished" in mended.source["notes"]
 
 
 @pytest.mark.parametrize(

@@ -10,7 +10,6 @@ import pytest
 from pythonosc.osc_bundle import OscBundle
 from scipy.spatial.transform import Rotation
 
-from devices.bodies.forward_kinematics import ForwardKinematics
 from devices.bodies.humanoid import humanoid_skeleton
 from devices.builtin.motions import motion_clip
 from devices.errors import InputError
@@ -27,6 +26,7 @@ from runtime.driving.performer import Performer
 from runtime.output.live.humanoid_bones import HumanoidBones, humanoid_bones
 from runtime.output.live.vmc_performer import LONGEST, VmcPerformer
 from runtime.output.output import PerformedFrame
+from solvers.skeleton.joint_poses import ForwardKinematics
 from tests.waiting import PATIENCE
 
 HUMAN = humanoid_skeleton()

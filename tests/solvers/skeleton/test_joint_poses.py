@@ -8,8 +8,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from devices.bodies.forward_kinematics import ForwardKinematics, conjugate, multiply, rotate
 from devices.bodies.unity_space import across_unity, turn_across_unity, unity_euler
+from solvers.skeleton.joint_poses import ForwardKinematics
+from solvers.skeleton.quaternions import conjugate, multiply, rotate
 
 MIRROR = np.diag([-1.0, 1.0, 1.0])
 
