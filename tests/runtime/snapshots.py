@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-IMMUTABLE = (bool, int, float, str, bytes, type(None), np.dtype, np.generic)
+IMMUTABLE = (bool, int, float, str, bytes, type(None), np.dtype, np.generic, type)
 
 
 def leaves(value: object, at: str = "state") -> Iterator[tuple[str, Any]]:
