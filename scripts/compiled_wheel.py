@@ -97,4 +97,4 @@ def _hash(data: bytes) -> str:
 
 
 if __name__ == "__main__":
-    print(build(Path(sys.argv[1] if len(sys.argv) > 1 else "dist")))  # noqa: T201
+    print(build(Path(sys.argv[1] if len(sys.argv) > 1 else "dist")))  # noqa: T201  # a command that prints its file

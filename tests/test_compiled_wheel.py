@@ -92,7 +92,7 @@ def test_a_processor_that_lacks_something_compiles_for_itself(lacking: str) -> N
         (True, False, "generic", True, "generic"),
     ],
 )
-def test_the_processor_is_chosen_before_numba_is_loaded(  # noqa: PLR0917  # one row of a table
+def test_the_processor_is_chosen_before_numba_is_loaded(
     monkeypatch: pytest.MonkeyPatch,
     tmp_path: Path,
     packed: bool,

@@ -9,6 +9,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tokenize
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from importlib import import_module
@@ -172,6 +173,9 @@ def test_a_player_can_stand_in_for_a_device() -> None:
 
 
 MOST_MODULES = 20  # in a folder, without its __init__.py
+MOST_LINES = 400  # of a file
+SUPPRESSED = re.compile(r"# *(?:noqa|type: *ignore)\b.*")
+REASONED = re.compile(r"# (?:noqa: [A-Z]+\d+(?:, [A-Z]+\d+)*|type: ignore\[[\w, -]+\])  # \S.+")
 
 
 def modules() -> list[Path]:
@@ -186,6 +190,34 @@ def named(paths: Iterable[Path]) -> list[str]:
 def test_no_folder_has_more_modules_than_one_can_look_through() -> None:
     folders = Counter(path.parent for path in modules() if path.name != "__init__.py")
     assert not named(folder for folder, count in folders.items() if count > MOST_MODULES)
+
+
+def test_no_file_is_longer_than_one_can_read() -> None:
+    lengths = {path: len(path.read_text(encoding="utf-8").splitlines()) for path in modules()}
+    assert not named(path for path, length in lengths.items() if length > MOST_LINES)
+
+
+def test_each_module_says_in_its_first_line_what_it_is() -> None:
+    said = {path: ast.get_docstring(ast.parse(path.read_text("utf-8"))) for path in modules()}
+    assert not named(path for path, docstring in said.items() if not docstring)
+    first = {path: str(docstring).splitlines()[0] for path, docstring in said.items()}
+    assert not named(path for path, line in first.items() if not line.endswith("."))
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_each_room_is_typed_for_those_who_import_it(room: str) -> None:
+    assert (CHECKOUT / room / "py.typed").is_file()
+
+
+def test_each_warning_that_is_suppressed_has_a_reason() -> None:
+    for path in modules():
+        with path.open("rb") as file:
+            comments = [
+                found[0]
+                for token in tokenize.tokenize(file.readline)
+                if token.type == tokenize.COMMENT and (found := SUPPRESSED.search(token.string))
+            ]
+        assert not [comment for comment in comments if not REASONED.fullmatch(comment)], path
 
 
 def tracked_text() -> Iterator[tuple[str, str]]:

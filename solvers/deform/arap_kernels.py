@@ -8,7 +8,7 @@ vertices are independent, and every sum has one order.
 from __future__ import annotations
 
 import numpy as np
-from numba import get_thread_id, prange  # type: ignore[attr-defined]
+from numba import get_thread_id, prange  # type: ignore[attr-defined]  # numba exports it untyped
 from numpy.typing import NDArray
 
 from solvers.deform.arap_cells import Cells, Terms
@@ -22,7 +22,7 @@ _ENTRIES = np.uint64(9)  # of a rotation
 
 
 @kernel
-def covariances(  # noqa: PLR0917
+def covariances(
     x: Floats, cells: Cells, first: int, size: int, lanes: Floats, laplace_x: Floats
 ) -> None:
     """Write the covariances S of `size` cells to rows 0 to 8 of `lanes`, and L x to laplace_x.

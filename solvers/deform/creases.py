@@ -124,7 +124,7 @@ def _is_folded(x: Floats, face: Indices, normal: Singles, R: Floats) -> bool:
 
 
 @parallel_kernel
-def _find_folded(  # noqa: PLR0917
+def _find_folded(
     x: Floats, faces: Indices, normals: Singles, R: Floats, part: int, folded: Bools
 ) -> None:
     """Update `folded` (F,) for one part of the triangles and for those known to be folded."""
@@ -134,7 +134,7 @@ def _find_folded(  # noqa: PLR0917
 
 
 @kernel
-def _lay_flat(  # noqa: PLR0917
+def _lay_flat(
     x: Floats, which: Ints, sheet: Sheet, R: Floats, cells: Cells, moving: Moving
 ) -> None:
     """Flatten the triangles `which`, then their neighbours that folded because of that."""
@@ -160,9 +160,7 @@ def _lay_flat(  # noqa: PLR0917
 
 
 @kernel
-def _flatten(  # noqa: PLR0917
-    x: Floats, which: Ints, sheet: Sheet, R: Floats, cells: Cells, moving: Moving
-) -> int:
+def _flatten(x: Floats, which: Ints, sheet: Sheet, R: Floats, cells: Cells, moving: Moving) -> int:
     """Move the corners of folded faces, and rings around them, until none of the faces is folded.
 
     Returns:

@@ -122,7 +122,7 @@ def stretched_turns(
 
 
 @kernel
-def _turn_and_stretch(  # noqa: PLR0917
+def _turn_and_stretch(
     turns: Floats, axes: Floats, lengths: Floats, thinning: float, whole: Floats, out: Floats
 ) -> None:
     stretched = np.empty((3, 3))

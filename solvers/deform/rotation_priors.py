@@ -30,7 +30,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import get_thread_id, prange  # type: ignore[attr-defined]
+from numba import get_thread_id, prange  # type: ignore[attr-defined]  # numba exports it untyped
 from numpy.typing import NDArray
 
 from solvers.deform.arap_cells import CellMesh, Cells
@@ -182,7 +182,7 @@ def leave_covariances(lanes: Floats, priors: Floats, first: int, size: int) -> N
 
 
 @parallel_kernel
-def fit_cells_near(  # noqa: PLR0917
+def fit_cells_near(
     x: Floats, cells: Cells, priors: Floats, R: Floats, laplace_x: Floats, room: Floats
 ) -> None:
     """`solvers.deform.arap_kernels.fit_cells` with priors (N, 9), which S then replaces."""
@@ -286,9 +286,7 @@ def unevenness(R: Floats, Q: Floats, region_of: Ints, rigid_masses: Floats, out:
 
 
 @parallel_kernel
-def twists(  # noqa: PLR0917
-    S: Floats, R: Floats, cells: Cells, factor: float, region_of: Ints, out: Floats
-) -> None:
+def twists(S: Floats, R: Floats, cells: Cells, factor: float, region_of: Ints, out: Floats) -> None:
     """Each cell's term of its region's common rotation, out (N, 9): (S_k + P_k) R_k^T.
 
     The prior P_k counts only cells of other regions: cells of the same region turn with it.

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from numba import get_thread_id, prange  # type: ignore[attr-defined]
+from numba import get_thread_id, prange  # type: ignore[attr-defined]  # numba exports it untyped
 
 from solvers.deform.arap_cells import Cells
 from solvers.deform.arap_kernels import covariances

@@ -49,7 +49,7 @@ class StiffSegments:
     rigidity: Array
 
 
-def find_stiff_segments(  # noqa: PLR0917
+def find_stiff_segments(
     vertices: Array,
     faces: Indices,
     parents: Indices,

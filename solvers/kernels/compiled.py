@@ -111,7 +111,7 @@ def run_together(work: Callable[[int, int], None], firsts: list[int], lasts: lis
 
 def most_threads() -> int:
     """The number of threads that a parallel kernel may use; each needs its own scratch memory."""
-    return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+    return int(numba.config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]  # numba makes it as it starts
 
 
 def one_blas_thread() -> AbstractContextManager[object]:

@@ -34,7 +34,7 @@ def stale_tasks(
     return stale
 
 
-def factorise(  # noqa: PLR0917
+def factorise(
     entries: Entries,
     stale: NDArray[np.bool_],
     blocks: Blocks,
@@ -53,7 +53,7 @@ def factorise(  # noqa: PLR0917
 
 
 @kernel
-def _factorise_subtree(  # noqa: PLR0917
+def _factorise_subtree(
     entries: Entries, first: int, last: int, blocks: Blocks, values: Values, updates: Updates
 ) -> None:
     """Fill the blocks from first, a leaf, to last, the root of its subtree, whose update is kept.

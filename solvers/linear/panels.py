@@ -45,7 +45,7 @@ def _product(width: int) -> Callable[..., None]:
     """Make the kernel that multiplies three vectors by one panel of `width` columns."""
 
     @kernel
-    def product(  # noqa: PLR0917
+    def product(
         panels: Singles,
         at: int,
         vectors: Singles,
@@ -74,7 +74,7 @@ _wide_product, _narrow_product = _product(WIDE), _product(NARROW)
 
 
 @kernel
-def multiply(  # noqa: PLR0917
+def multiply(
     panels: Singles,
     at: int,
     columns: int,

@@ -16,7 +16,7 @@ from solvers.linear.panels import Singles, multiply
 
 
 @parallel_kernel
-def add_solution(  # noqa: PLR0917
+def add_solution(
     blocks: Blocks, panels: Panels, schedule: Schedule, b: Floats, x: Floats, work: Workspace
 ) -> None:
     """Add the solution y of A y = b, both (n, 3), to the first n rows of x."""
@@ -28,7 +28,7 @@ def add_solution(  # noqa: PLR0917
 
 
 @kernel
-def _climb(  # noqa: PLR0917
+def _climb(
     blocks: Blocks, panels: Panels, schedule: Schedule, task: Index, b: Floats, work: Workspace
 ) -> None:
     """Forward substitution in a task's subtree."""
@@ -42,7 +42,7 @@ def _climb(  # noqa: PLR0917
 
 
 @kernel
-def _turn(  # noqa: PLR0917
+def _turn(
     blocks: Blocks, panels: Panels, schedule: Schedule, b: Floats, x: Floats, work: Workspace
 ) -> None:
     """Both substitutions in the blocks above the tasks; the tasks' updates are added in order."""
@@ -69,7 +69,7 @@ def _turn(  # noqa: PLR0917
 
 
 @kernel
-def _descend(  # noqa: PLR0917
+def _descend(
     blocks: Blocks, panels: Panels, schedule: Schedule, task: Index, x: Floats, work: Workspace
 ) -> None:
     """Backward substitution in a task's subtree; the solution is added to x."""
@@ -82,7 +82,7 @@ def _descend(  # noqa: PLR0917
 
 
 @kernel
-def _send_up(  # noqa: PLR0917
+def _send_up(
     blocks: Blocks, panels: Panels, first: Index, last: Index, y: Singles, sums: Singles
 ) -> None:
     """Forward substitution of blocks first to last: each takes G b from later unknowns."""
@@ -100,7 +100,7 @@ def _send_up(  # noqa: PLR0917
 
 
 @kernel
-def _send_down(  # noqa: PLR0917
+def _send_down(
     blocks: Blocks, panels: Panels, first: Index, last: Index, y: Singles, sums: Singles
 ) -> None:
     """Backward substitution of blocks last to first: inverse times b, less G^T times the later."""

@@ -121,7 +121,7 @@ def _firsts(sizes: Sequence[int]) -> Ints:
 
 
 @kernel
-def _retarget(  # noqa: PLR0917
+def _retarget(
     chains: _Chains, body: Array, gains: Array, turns: Array, last: Array, out: Array
 ) -> None:
     for d in range(len(gains)):

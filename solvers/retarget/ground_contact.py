@@ -33,7 +33,7 @@ def place_on_floor(points: Array, angle: float, about: Array, lift: float, out: 
 
 
 @kernel
-def _place_on_floor(  # noqa: PLR0917
+def _place_on_floor(
     points: Array, cosine: float, sine: float, about: Array, lift: float, out: Array
 ) -> float:
     lowest = np.inf

@@ -45,7 +45,7 @@ def expect(last: Array, velocity: Array, gap: float, wanted: Array) -> None:
 def distance(a: Array, b: Array) -> float:
     """The distance of two points (3,); NaN where one is unknown."""
     x, y, z = a[0] - b[0], a[1] - b[1], a[2] - b[2]
-    return np.sqrt(x * x + y * y + z * z)  # type: ignore[no-any-return]
+    return np.sqrt(x * x + y * y + z * z)  # type: ignore[no-any-return]  # numpy says Any of a scalar root
 
 
 @kernel

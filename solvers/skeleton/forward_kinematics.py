@@ -127,7 +127,7 @@ def pose(
 
 
 @kernel
-def _forward(  # noqa: PLR0917
+def _forward(
     links: Ints,
     rest: Array,
     driver: Ints,

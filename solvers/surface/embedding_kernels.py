@@ -101,7 +101,7 @@ def _search_around(surface: Triangles, vertex: int, places: Places, i: int) -> N
 
 
 @kernel
-def _barycentric(  # noqa: PLR0911  one return for each region
+def _barycentric(  # noqa: PLR0911  # one return for each region
     p: Floats, a: Floats, b: Floats, c: Floats
 ) -> tuple[float, float, float]:
     """The barycentric coordinates of the point of triangle (a, b, c) nearest to p, by regions.

@@ -1,3 +1,5 @@
+"""Filling gaps: joints that were not seen get plausible places and a flag."""
+
 from __future__ import annotations
 
 import math

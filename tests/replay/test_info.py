@@ -1,3 +1,5 @@
+"""What `bunraku info` says about a recording."""
+
 from __future__ import annotations
 
 from dataclasses import replace

@@ -1,3 +1,5 @@
+"""The player: frames at their times, seeking, speed and loops."""
+
 from __future__ import annotations
 
 import math

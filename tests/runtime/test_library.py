@@ -23,7 +23,7 @@ def test_every_name_is_there_and_every_other_is_not() -> None:
         assert getattr(runtime, name).__name__ == name
         assert name in dir(runtime)
     with pytest.raises(AttributeError, match="nothing"):
-        runtime.nothing  # noqa: B018  that it raises is the test
+        runtime.nothing  # noqa: B018  # that it raises is the test
 
 
 def test_the_types_are_those_of_the_names() -> None:

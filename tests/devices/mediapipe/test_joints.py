@@ -1,3 +1,5 @@
+"""The skeleton of MediaPipe's landmarks: names, parents and rest positions."""
+
 from __future__ import annotations
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""MediaPipe streams: landmarks from packets and from a webcam, and damaged ones."""
+
 from __future__ import annotations
 
 import json

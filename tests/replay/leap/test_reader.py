@@ -1,3 +1,5 @@
+"""Leap recordings: real files, hands and sides, and damaged files."""
+
 from __future__ import annotations
 
 import contextlib

@@ -1,3 +1,5 @@
+"""MCAP recordings: what is written comes back, also from damaged files."""
+
 from __future__ import annotations
 
 import contextlib

@@ -1,3 +1,5 @@
+"""MediaPipe recordings: landmarks from every kind of file, and damaged files."""
+
 from __future__ import annotations
 
 import contextlib

@@ -1,3 +1,5 @@
+"""Bundles of bones that start at one joint get a node where they part."""
+
 from dataclasses import replace
 
 import numpy as np

@@ -1,3 +1,5 @@
+"""The cache of extracted skeletons: named by content, safe against damage."""
+
 from __future__ import annotations
 
 import io

@@ -1,3 +1,5 @@
+"""Opening characters by file: every suffix, and what is refused."""
+
 from __future__ import annotations
 
 import base64

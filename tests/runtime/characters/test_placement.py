@@ -1,3 +1,5 @@
+"""Placement: characters stand upright on the floor, facing the front."""
+
 from __future__ import annotations
 
 from pathlib import Path

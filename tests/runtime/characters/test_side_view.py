@@ -1,3 +1,5 @@
+"""Side views: characters that are long from front to back are turned."""
+
 from dataclasses import replace
 
 import numpy as np

@@ -46,7 +46,7 @@ def test_a_margin_moves_the_camera_away_by_its_share() -> None:
     aspect=st.floats(0.4, 3.0),
     margin=st.floats(0.0, 0.3),
 )
-def test_boxes_touch_the_margin_and_never_cross_it(  # noqa: PLR0917  # hypothesis passes them by name
+def test_boxes_touch_the_margin_and_never_cross_it(
     low: tuple[float, float, float],
     size: tuple[float, float, float],
     yaw: float,

@@ -1,3 +1,5 @@
+"""Rods and beads of highlighted chains."""
+
 import numpy as np
 import pytest
 

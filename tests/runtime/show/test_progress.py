@@ -1,3 +1,5 @@
+"""The progress bar of a show: what it prints, and where it stays silent."""
+
 from __future__ import annotations
 
 import io

@@ -153,7 +153,7 @@ def test_pictures_are_drawn_when_they_are_taken(
 
 def test_a_show_that_draws_nothing_says_how_to_get_a_picture(figure: Character) -> None:
     with Show(recording(), [figure]) as show, pytest.raises(ValueError, match="pictures=True"):
-        show.picture  # noqa: B018  that it raises is the test
+        show.picture  # noqa: B018  # that it raises is the test
 
 
 def test_two_shows_take_turns_on_one_thread(context: moderngl.Context, figure: Character) -> None:

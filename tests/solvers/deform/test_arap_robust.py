@@ -22,7 +22,7 @@ KINDS = [*ENERGIES, "stiff", "squash"]
 FRAMES = 10  # that an inverted triangle may survive
 
 
-def make(  # noqa: PLR0917  # the parameters of one case
+def make(
     kind: str,
     vertices: np.ndarray,
     faces: np.ndarray,
@@ -167,7 +167,7 @@ def test_nothing_inverted_is_left_on_real_characters(shared: Path, kind: str, na
         _survive(solver, vertices, faces, handles, groups, ordeal)
 
 
-def _survive(  # noqa: PLR0917  # the parameters of one case
+def _survive(
     solver: ArapSolver,
     vertices: np.ndarray,
     faces: np.ndarray,

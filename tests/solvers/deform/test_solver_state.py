@@ -98,7 +98,7 @@ class Performance:
     between=st.lists(STEPS, max_size=4),
     quiet=st.integers(0, 9),
 )
-def test_solving_on_from_a_snapshot_gives_the_same_bytes(  # noqa: PLR0917  # hypothesis passes them by name
+def test_solving_on_from_a_snapshot_gives_the_same_bytes(
     kind: type[ArapSolver],
     energy: str,
     before: list[Step],

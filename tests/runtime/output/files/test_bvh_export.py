@@ -1,3 +1,5 @@
+"""BVH export: the performed motion comes back from the file."""
+
 from __future__ import annotations
 
 from dataclasses import replace

@@ -1,3 +1,5 @@
+"""Which exporter a file's suffix chooses."""
+
 from __future__ import annotations
 
 from pathlib import Path

@@ -1,3 +1,5 @@
+"""PNG sequences: one whole picture a frame."""
+
 from __future__ import annotations
 
 from dataclasses import replace

@@ -1,3 +1,5 @@
+"""glTF export: the animated character comes back from the file."""
+
 from __future__ import annotations
 
 import json

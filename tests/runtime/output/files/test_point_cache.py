@@ -1,3 +1,5 @@
+"""Point caches (PC2): vertices come back, also from a file that was cut off."""
+
 from __future__ import annotations
 
 import signal

@@ -1,3 +1,5 @@
+"""USD export: the animated character comes back from the file."""
+
 from __future__ import annotations
 
 from dataclasses import replace

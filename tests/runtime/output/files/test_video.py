@@ -1,3 +1,5 @@
+"""Videos: pictures at their times, and encoders that fail."""
+
 from __future__ import annotations
 
 import signal

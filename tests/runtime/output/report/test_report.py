@@ -1,3 +1,5 @@
+"""The report: its parts are whole and can be read as JSON."""
+
 from __future__ import annotations
 
 import json

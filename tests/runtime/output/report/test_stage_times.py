@@ -1,3 +1,5 @@
+"""The times of a tick's stages: medians, percentiles and maxima."""
+
 from __future__ import annotations
 
 import tracemalloc

@@ -1,3 +1,5 @@
+"""Edge stretch over a performance: means and percentiles."""
+
 from __future__ import annotations
 
 import numpy as np

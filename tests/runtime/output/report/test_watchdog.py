@@ -1,3 +1,5 @@
+"""The watchdog: energy, stretch and inverted triangles of a performance."""
+
 from __future__ import annotations
 
 import numpy as np
