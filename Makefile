@@ -9,7 +9,10 @@ READY := $(VENV)/.ready
 demo: $(READY)
 	$(BIN)/bunraku demo --video demo.mp4 --report demo.json
 
+# Kernels are compiled once before, not by each worker; bytecode is kept, as tests start many programs.
+test: export PYTHONDONTWRITEBYTECODE :=
 test: $(READY)
+	$(BIN)/bunraku doctor --warm
 	$(BIN)/python -m pytest -n auto --dist worksteal
 
 check: $(READY)
