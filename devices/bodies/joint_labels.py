@@ -25,8 +25,8 @@ def label_joints(skeleton: Skeleton) -> tuple[BodyPart | None, ...]:
     shape of the rest pose decides; it assumes that the performer's left is at +X.
     """
     parts: list[BodyPart | None] = [part_of_name(name) for name in skeleton.names]
-    told = sum(part is not None and part.kind is not Kind.ROOT for part in parts)
-    if told < min(_ENOUGH, len(parts)) and len(parts) <= _MOST_JOINTS_BY_SHAPE:
+    named = sum(part is not None and part.kind is not Kind.ROOT for part in parts)
+    if named < min(_ENOUGH, len(parts)) and len(parts) <= _MOST_JOINTS_BY_SHAPE:
         shape = _label_by_shape(skeleton)
         if any(part is not None for part in shape):
             return tuple(shape)

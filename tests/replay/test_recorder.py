@@ -85,7 +85,7 @@ def test_frames_of_many_threads_and_performers_are_all_there(tmp_path: Path) -> 
     recording = read_mcap(path)
     assert recording.notes in (
         (),
-        ("frames were not in the order of the performers' time; sorted",),
+        ("frames were not in order of the performers' time and were sorted",),
     )
     for performer in range(4):
         own = recording.of(performer)
