@@ -44,9 +44,8 @@ def warm_up() -> None:
     """Compile every kernel that a show can reach and that is not in the cache."""
     if has_list(_SOLVERS, _NOT_SHOWN) and has_list(_SHOW, _NOT_SHOWN):
         return
-    sys.stderr.write("bunraku: compiling kernels, once: a minute or two on two free cores\n")
-    solvers = subprocess.Popen([sys.executable, "-m", "runtime.cli.warm"])
-    with _shown() as compiled:
+    print("bunraku: compiling kernels, once: a minute or two on two free cores", file=sys.stderr)
+    with _process_of_solvers() as solvers, _shown() as compiled:
         _use_decoders_and_surfaces()
         while solvers.poll() is None:
             with suppress(subprocess.TimeoutExpired):
@@ -56,6 +55,16 @@ def warm_up() -> None:
         compiled.look()
     save_list(_SHOW, _NOT_SHOWN)
     remove_unused()
+
+
+@contextmanager
+def _process_of_solvers() -> Iterator[subprocess.Popen[bytes]]:
+    """Compile the solvers' kernels in another process, which ends with the block at the latest."""
+    with subprocess.Popen([sys.executable, "-m", "runtime.cli.warm"]) as solvers:
+        try:
+            yield solvers
+        finally:
+            solvers.terminate()
 
 
 class _Compiled(event.Listener):
