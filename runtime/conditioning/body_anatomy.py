@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from devices.bodies.joint_labels import label_joints
-from devices.bodies.joint_names import Kind, Side
+from devices.bodies.joint_names import BodyPart, Kind, Side
 from devices.skeleton import Skeleton
 
 Array = NDArray[np.float64]
@@ -56,33 +57,8 @@ class BodyAnatomy:
 def body_anatomy(skeleton: Skeleton) -> BodyAnatomy:
     """Find the anatomy of a skeleton by its joint names, or by its shape."""
     parts = label_joints(skeleton)
-    count = len(skeleton.names)
-    partner, group = np.arange(count), np.full(count, -1)
-    of_side: dict[Side, dict[tuple[Kind, bool, str, int | None], list[int]]] = {
-        Side.LEFT: {},
-        Side.RIGHT: {},
-    }
-    for joint in skeleton.order:
-        part = parts[joint]
-        if part is not None and part.side in of_side:
-            key = part.kind, part.tip, part.word, part.number
-            of_side[part.side].setdefault(key, []).append(joint)
-    for key, left in of_side[Side.LEFT].items():
-        for a, b in zip(left, of_side[Side.RIGHT].get(key, []), strict=False):
-            partner[a], partner[b] = b, a
-            part = parts[a]
-            assert part is not None
-            finger = _HAND_GROUP if part.kind.value.endswith(("finger", "thumb")) else -1
-            group[a] = group[b] = _GROUPS.get(part.kind, finger)
-    far = [
-        joint
-        for joint, part in enumerate(parts)
-        if part is not None
-        and part.kind in _STEADY
-        and not part.tip
-        and (above := parts[skeleton.parents[joint]] if skeleton.parents[joint] >= 0 else None)
-        and above.side is part.side
-    ]
+    partner, group = _partners(skeleton, parts)
+    far = [joint for joint in range(len(parts)) if _is_long_bone(skeleton, parts, joint)]
     feet = [
         joint
         for joint, part in enumerate(parts)
@@ -99,6 +75,36 @@ def body_anatomy(skeleton: Skeleton) -> BodyAnatomy:
         np.array(feet, dtype=np.int64),
         height[feet] - height.min() + sole if feet else np.zeros(0),
     )
+
+
+def _partners(skeleton: Skeleton, parts: Sequence[BodyPart | None]) -> tuple[Indices, Indices]:
+    """Return `partner` and `group` (J,) of a `BodyAnatomy`."""
+    partner, group = np.arange(len(parts)), np.full(len(parts), -1)
+    of_side: dict[Side, dict[tuple[Kind, bool, str, int | None], list[int]]] = {
+        Side.LEFT: {},
+        Side.RIGHT: {},
+    }
+    for joint in skeleton.order:
+        part = parts[joint]
+        if part is not None and part.side in of_side:
+            key = part.kind, part.tip, part.word, part.number
+            of_side[part.side].setdefault(key, []).append(joint)
+    for key, left in of_side[Side.LEFT].items():
+        kind = key[0]
+        finger = _HAND_GROUP if kind.value.endswith(("finger", "thumb")) else -1
+        for a, b in zip(left, of_side[Side.RIGHT].get(key, []), strict=False):
+            partner[a], partner[b] = b, a
+            group[a] = group[b] = _GROUPS.get(kind, finger)
+    return partner, group
+
+
+def _is_long_bone(skeleton: Skeleton, parts: Sequence[BodyPart | None], joint: int) -> bool:
+    """Return whether a joint is the far end of a long bone of a limb."""
+    part, parent = parts[joint], skeleton.parents[joint]
+    if part is None or part.kind not in _STEADY or part.tip or parent < 0:
+        return False
+    above = parts[parent]
+    return above is not None and above.side is part.side
 
 
 def _beyond(skeleton: Skeleton, joints: list[int]) -> NDArray[np.bool_]:

@@ -185,7 +185,7 @@ class Conditioner:
         whole = self._filler.place(positions, frame.time, frame.performer)
         positions, filled = whole.positions, whole.filled
         if on.outliers:
-            positions, late = memory.rejoining.lead(positions, filled, frame.time)
+            positions, late = memory.rejoining.blend(positions, filled, frame.time)
             corrected = corrected | late
         else:
             memory.rejoining.forget()

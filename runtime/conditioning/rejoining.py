@@ -62,7 +62,7 @@ class Rejoining:
         """Go back to a snapshot."""
         self._joints[:], self._at = state.joints, state.at
 
-    def lead(self, positions: Array, filled: Bools, time: float) -> tuple[Array, Bools]:
+    def blend(self, positions: Array, filled: Bools, time: float) -> tuple[Array, Bools]:
         """Return the places to show (J, 3) [m], and which joints (J,) are on their way.
 
         Args:
@@ -73,13 +73,15 @@ class Rejoining:
         shown, on_the_way = positions.copy(), np.zeros(len(positions), dtype=np.bool_)
         if not abs(time - self._at) < FORGET:
             self._joints["filled"] = False
-        _lead(self._joints, shown, filled, on_the_way, time)
+        _move_back(self._joints, shown, filled, on_the_way, time)
         self._at = time
         return shown, on_the_way
 
 
 @kernel
-def _lead(joints: Records, positions: Array, filled: Bools, on_the_way: Bools, time: float) -> None:
+def _move_back(
+    joints: Records, positions: Array, filled: Bools, on_the_way: Bools, time: float
+) -> None:
     for index, joint in enumerate(joints):
         place = positions[index]
         if joint.filled and not filled[index]:
