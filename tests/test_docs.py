@@ -138,6 +138,14 @@ def test_links_and_named_files_lead_somewhere(name: str) -> None:
         assert any(path.exists() for path in known), f"{name} names {file}"
 
 
+def test_every_step_of_a_frame_is_where_the_page_says() -> None:
+    steps = re.findall(r"^\| \w+ \| `(\S+)` \| `(\w+)` \|", page("docs/packet-to-pixel.md"), re.M)
+    assert len(steps) > 20
+    for file, name in steps:
+        source = (CHECKOUT / file).read_text(encoding="utf-8")
+        assert re.search(rf"^(class|def|void) {name}\b", source, re.MULTILINE), f"{file}: {name}"
+
+
 def test_the_tables_are_whole() -> None:
     commands = re.findall(r"^\| `bunraku (\w+)", page("README.md"), re.MULTILINE)
     usage = parser().format_help()
