@@ -1,1 +1,1 @@
-"""What a performance leaves behind: video, pictures, point caches, animated models, reports."""
+"""Outputs of a show: files, streams to other programs, and the report."""

@@ -1,4 +1,4 @@
-"""What the frame loop hands to everything that keeps a performance, and how it does so."""
+"""The interface of an output, and the frame that the loop hands to it."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from runtime.driving.targets import PosedNodes
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PerformedFrame:
-    """One tick of one character's performance, everything solved; nobody changes its arrays.
+    """One solved frame of one character. Outputs must not change its arrays.
 
     Attributes:
-        index: counts the frames of the show from 0.
-        time: the performance's time [s], never falling; only differences count.
-        vertices: (N, 3) [m] welded vertices of the character, on the stage; who keeps them copies
-            them, since a later frame overwrites them.
+        index: number of the frame in the show, from 0.
+        time: [s], never decreasing; only differences have a meaning.
+        vertices: (N, 3) [m] welded vertices of the character, on the stage. A later frame
+            overwrites them: an output that keeps them copies them.
         nodes: the K nodes of the character's skeleton, on the stage; None where the driver poses
             none.
-        poses: newest pose of each performer of the show, in the order of their slots; None for one
-            who has not come yet.
-        picture: (H, W, 4) uint8 sRGB with straight alpha, top row first, or None when nobody needs
-            one of this frame.
+        poses: newest pose of each performer of the show, in the order of their slots; None for a
+            performer who was not seen yet.
+        picture: (H, W, 4) uint8 sRGB with straight alpha, top row first, or None when no output
+            needs one for this frame.
     """
 
     index: int
@@ -38,7 +38,7 @@ class PerformedFrame:
     picture: NDArray[np.uint8] | None = None
 
     def nodes_for(self, what: str) -> PosedNodes:
-        """Return the posed nodes, for an output that cannot do without them.
+        """Return the posed nodes, for an output that requires them.
 
         Args:
             what: the output, for the message.
@@ -55,20 +55,20 @@ class PerformedFrame:
 
 
 class Output(Protocol):
-    """Something that keeps a performance, frame by frame.
+    """Stores or sends a performance, frame by frame.
 
-    Whatever can be known to fail (no such folder, a wrong suffix, a missing library) fails in the
-    constructor, before the show. `write` and `close` raise InputError when the disk fails. What
-    was written is whole and readable after `close`, however early that comes.
+    Every problem that can be known beforehand (a missing folder, a wrong suffix, a missing library)
+    raises InputError in the constructor, before the show. `write` and `close` raise InputError when
+    the disk fails. After `close` the file is whole and readable, however early `close` is called.
     """
 
     @property
     def pictures_a_second(self) -> float:
-        """How many frames in a second must come with their picture: 0 none, infinite all."""
+        """Pictures per second that the output needs: 0 for none, infinite for every frame."""
         ...
 
     def write(self, frame: PerformedFrame) -> None:
-        """Keep one frame."""
+        """Store or send one frame."""
         ...
 
     def close(self) -> None:
@@ -82,7 +82,7 @@ class Output(Protocol):
 
 @runtime_checkable
 class Screen(Protocol):
-    """An output for viewers elsewhere, who see a picture also while no performer is seen."""
+    """An output with live viewers: it also gets pictures while no performer is seen."""
 
     def show(self, picture: NDArray[np.uint8]) -> None:
         """Show a picture, (H, W, 4) uint8 sRGB with straight alpha, top row first."""

@@ -1,4 +1,4 @@
-"""What is done to a finished picture before it goes to a file, a camera or another program."""
+"""Alpha and size conversions of a finished picture for files, cameras and other programs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ Picture = NDArray[np.uint8]
 
 
 def premultiplied(picture: Picture) -> Picture:
-    """A picture (H, W, 4) with its colours multiplied by its alpha, which stays."""
+    """Multiply the colours of a picture (H, W, 4) by its alpha; the alpha stays."""
     alpha = picture[..., 3:]
     if (alpha == 255).all():
         return picture
@@ -20,14 +20,15 @@ def premultiplied(picture: Picture) -> Picture:
 
 
 def on_black(picture: Picture) -> Picture:
-    """The colours (H, W, 3) of a picture (H, W, 4) as it looks on black."""
+    """Return the colours (H, W, 3) of a picture (H, W, 4) composed over black."""
     return np.ascontiguousarray(premultiplied(picture)[..., :3])
 
 
 def fitted(picture: Picture, size: tuple[int, int]) -> Picture:
-    """A picture (H, W, 4) as large as fits into `size`, width and height [px], in its middle.
+    """Scale a picture (H, W, 4) to fit into `size`, width and height [px], and centre it.
 
-    What is left beside it is as the picture's upper left corner: nothing, or the plain background.
+    The bars beside it take the colour of the picture's upper left corner: transparent, or the plain
+    background.
     """
     height, width = picture.shape[:2]
     if (width, height) == size:

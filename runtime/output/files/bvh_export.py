@@ -1,4 +1,4 @@
-"""The motion of the character's skeleton as a BVH file."""
+"""Export of the motion of a character's skeleton as a BVH file."""
 
 from __future__ import annotations
 
@@ -17,23 +17,22 @@ from runtime.output.output import PerformedFrame
 
 
 class BvhExport:
-    """Writes the skeleton at rest, and one line of channels for every frame.
+    """Writes the skeleton at rest, and one line of channels per frame, in centimetres.
 
-    In centimetres. Bones keep their rest length, and turn such that each points where the
-    performance has it: the nodes' own rotations, and as little on top of them as the directions to
-    the children ask for.
+    Bones keep their rest length. Each bone has the direction of the performance: the rotation of
+    its node, plus the smallest turn that aims it at its children.
 
-    BVH has one time step for all frames. It is the median step of the show; a show with jitter or
-    gaps is interpolated at that rate, so that it keeps its timing.
+    BVH has one time step for all frames: here the median step of the show. A show with jitter or
+    gaps is interpolated at that rate, so it keeps its timing.
 
-    Everything is written at the end, in one piece.
+    The file is written at the end, in one piece.
 
     Args:
         path: ends in .bvh.
-        character: who performs.
+        character: the performed character.
 
     Raises:
-        InputError: another suffix, or the file cannot be written.
+        InputError: the suffix is not .bvh, or the file cannot be written.
     """
 
     pictures_a_second = 0.0
@@ -47,11 +46,11 @@ class BvhExport:
         self._closed = False
 
     def write(self, frame: PerformedFrame) -> None:
-        """Keep one frame."""
+        """Store one frame."""
         self._motion.add(frame)
 
     def close(self) -> None:
-        """Write the file; without frames it has none.
+        """Write the file; a show without frames gives a file without frames.
 
         Raises:
             InputError: the disk fails.
@@ -80,7 +79,7 @@ class BvhExport:
 
 
 def _evenly_timed(motion: NodeMotion) -> tuple[NodeMotion, float]:
-    """The motion at even times, and the time between two of its frames [s]."""
+    """Return the motion resampled at even times, and its time step [s]."""
     even = even_times(motion.times)
     if even is None:
         return motion, LONE_STEP

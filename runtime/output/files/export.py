@@ -1,4 +1,4 @@
-"""Which exporter writes a performed character to which file."""
+"""Chooses the exporter of a performed character by the suffix of the file."""
 
 from __future__ import annotations
 
@@ -15,12 +15,15 @@ SUFFIXES = (".glb", ".usdc", ".usda", ".bvh")
 
 
 def open_export(path: Path, character: Character, *, rate: float = 30.0) -> Output:
-    """The export that the suffix of `path` asks for: .glb, .usda, .usdc or .bvh.
+    """Open the exporter for the suffix of `path`: .glb, .usda, .usdc or .bvh.
 
-    `rate` is about how many frames a second will come.
+    Args:
+        path: the file to write.
+        character: the performed character.
+        rate: approximate frames per second.
 
     Raises:
-        InputError: another suffix, a missing library, or the file cannot be written.
+        InputError: the suffix is unknown, a library is missing, or the file cannot be written.
     """
     suffix = check_suffix(path, SUFFIXES)
     if suffix == ".glb":

@@ -1,4 +1,4 @@
-"""The pictures of a performance as numbered PNG files."""
+"""Output of numbered PNG files."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ from devices.errors import InputError
 from runtime.output.files.whole_file import check_writable, whole_file, writing
 from runtime.output.output import PerformedFrame
 
-_FAST = 1  # zlib level: half as large as level 0 here, and four times as fast as the default
+_FAST = 1  # zlib level: half the size of level 0 here, four times as fast as the default
 
 
 class Frames:
-    """Writes ``000000.png``, ``000001.png``, ... into a folder, in the order the frames come.
+    """Writes ``000000.png``, ``000001.png``, ... into a folder, one per frame.
 
-    A picture keeps its alpha when any of it is transparent. Each file appears whole. Pictures
-    numbered higher, left there by an earlier and longer show, are removed at the end, so that the
-    folder holds one performance.
+    A picture keeps its alpha when any pixel is transparent. Each file appears whole. At the end,
+    pictures with higher numbers from an earlier, longer show are removed, so that the folder holds
+    one performance.
 
     Args:
-        folder: made if it is not there; its parent must be.
+        folder: created if it does not exist; its parent must exist.
 
     Raises:
-        InputError: the folder cannot be made or written to.
+        InputError: the folder cannot be created or written to.
     """
 
     pictures_a_second = math.inf
@@ -56,7 +56,7 @@ class Frames:
         self._count += 1
 
     def close(self) -> None:
-        """Remove what an earlier, longer show left behind."""
+        """Remove the pictures of an earlier, longer show."""
         if self._count == 0:
             return
         with writing(self._folder):
@@ -73,6 +73,6 @@ class Frames:
 
 
 def _without_idle_alpha(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """The picture (H, W, 4), or its (H, W, 3) colours when none of it is transparent."""
+    """Return the picture (H, W, 4), or only its colours (H, W, 3) when it is opaque."""
     opaque = bool((picture[..., 3] == 255).all())
     return np.ascontiguousarray(picture[..., :3]) if opaque else picture

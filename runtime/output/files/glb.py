@@ -1,4 +1,4 @@
-"""The binary glTF container: arrays, images and a description of them in one file."""
+"""Writer of the binary glTF container: arrays, images and their JSON description in one file."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _SHAPES = {(): "SCALAR", (2,): "VEC2", (3,): "VEC3", (4,): "VEC4", (4, 4): "MAT4
 
 
 class GlbBuilder:
-    """Gathers the parts of a glTF 2.0 file; `document` is its JSON, filled in by the caller."""
+    """Collects the parts of a glTF 2.0 file. The caller fills in `document`, its JSON."""
 
     def __init__(self) -> None:
         self.document: dict[str, Any] = {
@@ -40,9 +40,9 @@ class GlbBuilder:
         normalized: bool = False,
         bounds: bool = False,
     ) -> int:
-        """Store an array of float32, uint32 or uint16; give its accessor.
+        """Store an array of float32, uint32 or uint16, and return the index of its accessor.
 
-        Matrices (n, 4, 4) are given row by row and stored column by column, as glTF has it.
+        Matrices (n, 4, 4) are given row-major and stored column-major, as glTF requires.
         """
         shape = values.shape[1:]
         accessor: dict[str, Any] = {
@@ -60,7 +60,7 @@ class GlbBuilder:
         return self._add("accessors", accessor)
 
     def add_texture(self, pixels: NDArray[np.uint8]) -> int:
-        """Store an image (h, w, 4) as PNG; give its texture."""
+        """Store an image (h, w, 4) as PNG, and return the index of its texture."""
         png = io.BytesIO()
         Image.fromarray(pixels).save(png, format="PNG")
         view = self._add_view(png.getvalue(), None)
@@ -68,7 +68,7 @@ class GlbBuilder:
         return self._add("textures", {"source": image})
 
     def save(self, path: Path) -> None:
-        """Write the file, whole.
+        """Write the whole file.
 
         Raises:
             InputError: the disk fails, or the file would exceed the 4 GiB of the container.

@@ -1,4 +1,4 @@
-"""The performed character as an animated, skinned .glb."""
+"""Export of a performed character as an animated, skinned .glb."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ from solvers.surface.skin_weights import (
     skin_of_weights,
 )
 
-_SAMPLES = 64  # frames kept to fit the skin to, at most
-_STILL = 1e-6  # of the character's size: less motion than this needs no channel
-_ROUGHNESS = 0.8  # cloth and paint, as the puppets on our own stage
+_SAMPLES = 64  # most frames that the skin is fitted to
+_STILL = 1e-6  # of the character's size: smaller motion needs no channel
+_ROUGHNESS = 0.8  # cloth and paint, like the puppets on our own stage
 
 
 @dataclass(frozen=True, slots=True)
 class SkinDeviation:
-    """How far the skinned surface is from the performed one.
+    """Distance between the skinned surface and the performed one.
 
     Attributes:
-        rms: root of the mean square over the vertices of the sampled frames [m].
-        greatest: the greatest of them [m].
+        rms: root mean square over the vertices of the sampled frames [m].
+        greatest: maximum over the same vertices [m].
     """
 
     rms: float
@@ -45,23 +45,23 @@ class SkinDeviation:
 class GltfExport:
     """Writes mesh, materials, skeleton, skin and animation, on the stage: metres, +Y up.
 
-    The motion is that of the skeleton's nodes, which every game engine plays; the surface follows
-    by linear blend skinning with four nodes a vertex. That approximates the performed surface: the
-    weights are those of the character's file, else they are fitted to as many as 64 frames of the
-    show. `deviation` says how near it comes, and the file itself in the mesh's ``extras``. The
-    exact surface is in the point cache and the USD export.
+    The animation moves the skeleton's nodes, which every game engine plays. The surface follows by
+    linear blend skinning with four nodes per vertex, which approximates the performed surface. The
+    weights come from the character's file, or are fitted to up to 64 frames of the show.
+    `deviation` measures the error; the file has it too, in the mesh's ``extras``. The point cache
+    and the USD export hold the exact surface.
 
-    Everything is written at the end, in one piece.
+    The file is written at the end, in one piece.
 
     Attributes:
-        deviation: None before `close`, and without frames.
+        deviation: None before `close`, and in a show without frames.
 
     Args:
         path: ends in .glb.
-        character: who performs.
+        character: the performed character.
 
     Raises:
-        InputError: another suffix, or the file cannot be written.
+        InputError: the suffix is not .glb, or the file cannot be written.
     """
 
     pictures_a_second = 0.0
@@ -72,13 +72,13 @@ class GltfExport:
         self._path, self._character = path, character
         self._motion = NodeMotionRecorder(len(character.skeleton.names))
         self._samples: list[PerformedFrame] = []
-        self._stride = 1  # of the frames kept in _samples
+        self._stride = 1  # frames per kept sample
         self._written = 0
         self._closed = False
         self.deviation: SkinDeviation | None = None
 
     def write(self, frame: PerformedFrame) -> None:
-        """Keep one frame."""
+        """Store one frame."""
         self._motion.add(frame)
         if self._written % self._stride == 0:
             self._samples.append(replace(frame, vertices=frame.vertices.copy(), picture=None))
@@ -88,7 +88,7 @@ class GltfExport:
         self._written += 1
 
     def close(self) -> None:
-        """Fit the skin and write the file; without frames it holds the rest pose.
+        """Fit the skin and write the file; a show without frames gives the rest pose.
 
         Raises:
             InputError: the disk fails.
@@ -129,7 +129,7 @@ class GltfExport:
 
 
 def _add_skeleton(builder: GlbBuilder, character: Character) -> None:
-    """Nodes 0 to K - 1 are the skeleton's, node K carries the mesh; skin 0 binds them."""
+    """Add nodes 0 to K - 1 for the skeleton, node K for the mesh, and skin 0 that binds them."""
     skeleton = character.skeleton
     rest = skeleton.rest_positions
     nodes: list[dict[str, Any]] = []
@@ -158,7 +158,7 @@ def _add_skeleton(builder: GlbBuilder, character: Character) -> None:
 def _add_mesh(
     builder: GlbBuilder, character: Character, skin: Skin, deviation: SkinDeviation | None
 ) -> None:
-    """One primitive for each material in use, all on the same vertices."""
+    """Add one primitive for each material in use; all share the same vertices."""
     surface = character.surface
     attributes = _attributes(builder, character, skin)
     primitives: list[dict[str, Any]] = []
@@ -205,7 +205,7 @@ def _attributes(builder: GlbBuilder, character: Character, skin: Skin) -> dict[s
 
 
 def _four_influences(skin: Skin) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """Nodes and weights (N, 4); a node that has no weight is written as 0, as glTF wants it."""
+    """Return nodes and weights (N, 4); a node without weight is 0, as glTF requires."""
     padding = ((0, 0), (0, INFLUENCES - skin.nodes.shape[1]))
     weights = np.pad(skin.weights, padding)
     return np.where(weights > 0, np.pad(skin.nodes, padding), 0), weights
@@ -220,13 +220,13 @@ def _material(builder: GlbBuilder, surface: Surface, material: Material) -> dict
     }
     if material.texture is not None and surface.uvs is not None:
         look["baseColorTexture"] = {"index": builder.add_texture(material.texture)}
-    # Surfaces of unknown origin may be open: both sides are drawn, as on our own stage.
+    # The surface may be open: both sides are drawn, as on our own stage.
     described: dict[str, Any] = {"pbrMetallicRoughness": look, "doubleSided": True}
     return described | ({"alphaMode": "BLEND"} if color[3] < 1 else {})
 
 
 def _add_animation(builder: GlbBuilder, character: Character, motion: NodeMotion) -> None:
-    """Channels for what leaves the rest pose: a bone that keeps its length only rotates."""
+    """Add channels only for motion: a bone that keeps its length has no translation channel."""
     if len(motion.times) == 0:
         return
     skeleton = character.skeleton
@@ -254,7 +254,7 @@ def _add_animation(builder: GlbBuilder, character: Character, motion: NodeMotion
 
 
 def _vertex_normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Unit normals (N, 3), weighted by area; +Y where no face says otherwise."""
+    """Return unit normals (N, 3), weighted by area; +Y for a vertex without a face."""
     a, b, c = (vertices[faces[:, corner]] for corner in range(3))
     areas = np.cross(b - a, c - a)
     normals = np.zeros_like(vertices)

@@ -1,4 +1,4 @@
-"""How the nodes of a character moved over a whole show."""
+"""The motion of a character's nodes over a whole show, for exporters."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from runtime.output.output import PerformedFrame
 
 @dataclass(frozen=True, slots=True, eq=False)
 class NodeMotion:
-    """Every node in every frame, on the stage.
+    """Positions and rotations of every node in every frame, on the stage.
 
     Attributes:
-        times: (T,) [s] since the first frame, strictly rising.
+        times: (T,) [s] since the first frame, strictly increasing.
         positions: (T, K, 3) [m].
-        rotations: (T, K, 4) unit quaternions (x, y, z, w), world, since the rest pose; signs are
-            such that neighbours in time are near each other.
+        rotations: (T, K, 4) unit quaternions (x, y, z, w), world, since the rest pose; their signs
+            are chosen so that consecutive quaternions are close.
     """
 
     times: NDArray[np.float64]
@@ -28,10 +28,10 @@ class NodeMotion:
     rotations: NDArray[np.float64]
 
     def local(self, skeleton: Skeleton) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Translations (T, K, 3) and rotations (T, K, 4) of each node in its parent's frame.
+        """Return translations (T, K, 3) and rotations (T, K, 4) of each node relative to its parent.
 
-        Frames of nodes are parallel to the stage's axes at rest, so that the local rotations of
-        the rest pose are identities. The root's parent is the stage.
+        At rest, the axes of every node are parallel to the stage's, so the local rotations of the
+        rest pose are identities. The root's parent is the stage.
         """
         frames, nodes = self.positions.shape[:2]
         translations, rotations = self.positions.copy(), self.rotations.copy()
@@ -48,7 +48,7 @@ class NodeMotion:
 
 
 class NodeMotionRecorder:
-    """Collects the motion of the nodes, 28 bytes a node and frame."""
+    """Collects the motion of the nodes: 28 bytes per node and frame."""
 
     def __init__(self, nodes: int) -> None:
         self._nodes = nodes
@@ -57,18 +57,18 @@ class NodeMotionRecorder:
         self._rotations: list[NDArray[np.float32]] = []
 
     def add(self, frame: PerformedFrame) -> None:
-        """Keep one frame, unless its time is that of the one before."""
+        """Store one frame, unless its time equals that of the frame before."""
         if self._times and np.float32(frame.time - self._times[0]) <= np.float32(
             self._times[-1] - self._times[0]
         ):
-            return  # files keep times as float32, which must rise
+            return  # files store times as float32, which must increase
         nodes = frame.nodes_for("an exported skeleton")
         self._times.append(frame.time)
         self._positions.append(nodes.positions.astype(np.float32))
         self._rotations.append(nodes.rotations.astype(np.float32))
 
     def motion(self) -> NodeMotion:
-        """All that was collected."""
+        """Return everything collected so far."""
         frames = len(self._times)
         times = np.array(self._times, np.float64)
         positions = np.array(self._positions, np.float64).reshape(frames, self._nodes, 3)
@@ -78,9 +78,9 @@ class NodeMotionRecorder:
 
 
 def continuous_signs(quaternions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """The same rotations (T, ..., 4), with signs such that each is near the one before it.
+    """Return the same rotations (T, ..., 4) with signs that make consecutive quaternions close.
 
-    Programs that interpolate the four numbers one by one would take the long way otherwise.
+    Otherwise programs that interpolate the four numbers separately would turn the long way round.
     """
     if len(quaternions) == 0:
         return quaternions

@@ -1,4 +1,4 @@
-"""The deformed surface, frame by frame, as a PC2 point cache."""
+"""Output of the deformed vertices as a PC2 point cache."""
 
 from __future__ import annotations
 
@@ -17,21 +17,21 @@ _MOST_SAMPLES = 2**31 - 1
 
 
 class PointCache:
-    """Writes every frame as one sample of a PC2 file, to be put on the original mesh elsewhere.
+    """Writes every frame as one sample of a PC2 file, for use with the original mesh elsewhere.
 
     Points are the vertices of the character's file, in the file's order, units and axes, so the
-    cache fits the mesh as Blender's Mesh Cache modifier or Houdini reads it. The layout, little
+    cache fits the mesh that Blender's Mesh Cache modifier or Houdini reads. The layout, little
     endian: ``POINTCACHE2\\0``, int32 version 1, int32 points, float32 start frame 0, float32
     sample rate 1, int32 samples; then float32 (samples, points, 3). The sample rate counts frames
-    per sample: one sample a frame. The format has no clock, so the scene's own frame rate decides
-    how fast it plays. Nothing but the points goes into the file: equal shows give equal bytes.
+    per sample: one sample per frame. The format has no clock, so the frame rate of the other
+    program decides how fast it plays. The file holds only the points: equal shows give equal bytes.
 
-    The count of samples is mended after each of them, so that a killed program leaves a cache of
-    all the frames that it had performed.
+    The sample count in the header is updated after each sample, so a killed program leaves a cache
+    of all frames performed so far.
 
     Args:
         path: the file to write.
-        character: whose vertices come.
+        character: the performed character.
 
     Raises:
         InputError: the file cannot be written.
@@ -58,7 +58,7 @@ class PointCache:
         """Append one sample.
 
         Raises:
-            InputError: the disk fails, or the format can count no more samples.
+            InputError: the disk fails, or the format cannot count more samples.
         """
         if self._file is None:
             raise ValueError("the point cache is closed")
@@ -72,7 +72,7 @@ class PointCache:
             self._put(self._file, _HEADER.size - _SAMPLES.size, count)
 
     def close(self) -> None:
-        """Cut off a sample that could not be written whole, and close the file."""
+        """Cut off an incomplete last sample, and close the file."""
         file, self._file = self._file, None
         if file is not None:
             with writing(self._path), file:
@@ -81,14 +81,14 @@ class PointCache:
 
     @property
     def _end(self) -> int:
-        """Where the next sample begins [bytes]."""
+        """Offset of the next sample [bytes]."""
         return _HEADER.size + self._samples * self._points * 12
 
     @staticmethod
     def _put(file: BinaryIO, offset: int, data: bytes) -> None:
         file.seek(offset)
         rest = memoryview(data)
-        while rest:  # an unbuffered file may take less than it is given
+        while rest:  # an unbuffered write may be partial
             rest = rest[file.write(rest) :]
 
     def __enter__(self) -> Self:

@@ -1,4 +1,4 @@
-"""The performed surface, exactly, as a USD mesh with time samples."""
+"""Export of the exact performed surface as a USD mesh with time samples."""
 
 from __future__ import annotations
 
@@ -16,22 +16,22 @@ from runtime.output.output import PerformedFrame
 
 
 class UsdExport:
-    """Writes ``/Character/Surface``: points in every frame, exactly as performed.
+    """Writes ``/Character/Surface``, with the exact points of every frame.
 
-    On the stage: metres, +Y up. Vertices and faces are those of the character's file, in its
+    Coordinates are those of the stage: metres, +Y up. Vertices and faces are those of the character's file, in its
     order. Colours, textures included, are sampled at the vertices into ``displayColor``; texture
-    coordinates are kept as ``primvars:st``. Time codes count frames at `rate`, and each frame lies
-    at its own time, so that jitter and gaps are kept.
+    coordinates are kept as ``primvars:st``. Time codes count frames at `rate`, and each frame has
+    its own time, so jitter and gaps are kept.
 
-    Everything is written at the end, in one piece.
+    The file is written at the end, in one piece.
 
     Args:
         path: ends in .usda (text) or .usdc (binary).
-        character: who performs.
-        rate: time codes a second.
+        character: the performed character.
+        rate: time codes per second.
 
     Raises:
-        InputError: another suffix, usd-core is missing, or the file cannot be written.
+        InputError: the suffix is unknown, usd-core is missing, or the file cannot be written.
     """
 
     pictures_a_second = 0.0
@@ -50,14 +50,14 @@ class UsdExport:
         self._mesh = self._describe(character)
 
     def write(self, frame: PerformedFrame) -> None:
-        """Keep one frame; of frames at one time the last counts."""
+        """Store one frame; of several frames at one time, the last one is kept."""
         if self._start is None:
             self._start = frame.time
         self._last = round((frame.time - self._start) * self._rate, 6)
         self._put_points(self._mesh, frame.vertices[self._vertex], self._last)
 
     def close(self) -> None:
-        """Write the file; without frames it holds the rest pose.
+        """Write the file; a show without frames gives the rest pose.
 
         Raises:
             InputError: the disk fails.
@@ -74,7 +74,7 @@ class UsdExport:
                 raise OSError(_first_reason(str(error))) from error
 
     def _describe(self, character: Character) -> Any:
-        """Lay out the stage: everything that does not change over the show."""
+        """Author everything that does not change during the show."""
         geometry = self._pxr.UsdGeom
         geometry.SetStageUpAxis(self._stage, geometry.Tokens.y)
         geometry.SetStageMetersPerUnit(self._stage, 1.0)
@@ -95,7 +95,7 @@ class UsdExport:
         return mesh
 
     def _paint(self, mesh: Any, surface: Surface) -> None:
-        """Author colours, opacity where there is any transparency, and texture coordinates."""
+        """Author colours, texture coordinates, and opacity if anything is transparent."""
         geometry, arrays = self._pxr.UsdGeom, self._pxr.Vt
         vertex = geometry.Tokens.vertex
         colors = vertex_colors(surface)
@@ -111,7 +111,7 @@ class UsdExport:
             primvar.Set(arrays.Vec2fArray.FromNumpy(upward.astype(np.float32)))
 
     def _put_points(self, mesh: Any, points: NDArray[np.float64], time: float | None) -> None:
-        """Author points (M, 3) and their extent at a time code, or as the default value."""
+        """Author points (M, 3) and their extent, at a time code or as the default value."""
         written = np.ascontiguousarray(points, np.float32)
         extent = np.stack([written.min(axis=0), written.max(axis=0)])
         at = self._pxr.Usd.TimeCode.Default() if time is None else time
@@ -126,9 +126,9 @@ class UsdExport:
 
 
 def vertex_colors(surface: Surface) -> NDArray[np.float32]:
-    """Linear RGBA (M, 4) of each file vertex: its own colour times its material's and texture's.
+    """Return linear RGBA (M, 4) per file vertex: vertex colour times material and texture colour.
 
-    A vertex on the border of two materials takes the later one.
+    A vertex on the border of two materials takes the later material.
     """
     tints = np.ones((len(surface.vertex), 4), np.float32)
     for index, material in enumerate(surface.materials):
@@ -142,7 +142,7 @@ def vertex_colors(surface: Surface) -> NDArray[np.float32]:
 
 
 def _sampled(texture: NDArray[np.uint8], uvs: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Linear RGBA (n, 4) of the nearest pixels of an sRGB texture (h, w, 4), which repeats."""
+    """Sample a repeating sRGB texture (h, w, 4) at the nearest pixels: linear RGBA (n, 4)."""
     height, width = texture.shape[:2]
     place = np.nan_to_num(uvs) % 1.0
     row = np.minimum((place[:, 1] * height).astype(int), height - 1)
@@ -156,7 +156,7 @@ def _sampled(texture: NDArray[np.uint8], uvs: NDArray[np.float32]) -> NDArray[np
 
 
 def _first_reason(message: str) -> str:
-    """The system's reason within a stack of errors of the USD library."""
+    """Extract the system's reason from the error stack of the USD library."""
     quoted = re.search(r" : '(.*)'$", message, re.MULTILINE)
     return quoted[1] if quoted else "the USD library could not save it"
 

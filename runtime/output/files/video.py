@@ -1,4 +1,4 @@
-"""The pictures of a performance as a video, each shown at the time it was performed."""
+"""Output of a video file with variable frame rate."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from runtime.output.output import PerformedFrame
 from runtime.output.pictures import premultiplied
 
 _TICKS = 90_000  # a second, MPEG's own clock
-_SHORTEST = _TICKS // 1000  # Matroska counts milliseconds: no two frames may fall into one
+_SHORTEST = _TICKS // 1000  # Matroska counts milliseconds: no two frames may share one
 _BT709 = 1  # primaries, transfer and matrix alike; ITU-T H.273, tables 2 to 4
 _LIMITED_RANGE = 1  # luma 16 to 235, as players expect
 _H264 = {
-    # Mode 3 spends more bits where it is dark, as on a puppet stage: no bands in its gradients.
+    # Mode 3 spends more bits on dark areas, so dark gradients of the stage show no bands.
     "libx264": {"crf": "18", "preset": "veryfast", "aq-mode": "3"},
     "libopenh264": {"b": "8M"},
     "mpeg4": {"qscale": "3", "flags": "+qscale"},
@@ -47,24 +47,26 @@ _ENCODERS: dict[str, dict[str, dict[str, str]]] = {
 
 
 class Video:
-    """Writes H.264 (VP9 for ``.webm``), 4:2:0, BT.709, every picture exactly once at its own time.
+    """Writes H.264 (VP9 for ``.webm``), 4:2:0, BT.709, each picture once, at its own time.
 
-    The frame rate is variable: each frame keeps the time it was performed at, so a recording with
-    gaps or jitter plays with its own timing. An odd side grows by one pixel, its edge repeated;
-    what is transparent is shown on black; pictures of another size than the first are scaled.
+    The frame rate is variable: each frame keeps its time in the show, so a recording with gaps or
+    jitter plays with its own timing. An odd side grows by one pixel that repeats the edge.
+    Transparent areas become black. Pictures that differ in size from the first one are scaled.
 
-    While it grows the file is fragmented, a piece a second, and playable if the program is
-    killed; `close` makes it an ordinary file that seeks everywhere (with an FFmpeg before 8 it
-    stays fragmented, which players take too).
+    The growing file is fragmented, one piece per second, and is playable if the program is killed.
+    `close` turns it into an ordinary file with an index. With FFmpeg before version 8 it stays
+    fragmented, which players accept as well.
 
     Args:
         path: ends in .mp4, .m4v, .mov, .mkv or .webm.
-        rate: about how many frames a second will come; a hint, and how long the last frame is
-            shown when it is the only one.
-        pictures_a_second: how many it asks for; a frame without a picture is left out.
+        rate: approximate frames per second: a hint for the encoder, and the duration of the last
+            frame when it is the only one.
+        pictures_a_second: pictures per second that the video needs; frames without a picture are
+            skipped.
 
     Raises:
-        InputError: another suffix, PyAV or an encoder is missing, or the file cannot be written.
+        InputError: the suffix is unknown, PyAV or an encoder is missing, or the file cannot be
+            written.
     """
 
     def __init__(self, path: Path, *, rate: float = 30.0, pictures_a_second: float = 60.0) -> None:
@@ -112,7 +114,7 @@ class Video:
                 self._container.mux(self._stream.encode(encoded))
 
     def close(self) -> None:
-        """Finish the file; without a single frame there is none.
+        """Finish the file; a show without frames leaves no file.
 
         Raises:
             InputError: the disk fails.
@@ -132,7 +134,7 @@ class Video:
             self._path.unlink()
 
     def _place(self, time: float) -> tuple[int, int]:
-        """When to show a frame, and for how long if no other follows [ticks]."""
+        """Return the presentation time of a frame, and its duration if it is the last [ticks]."""
         ticks = round(_TICKS * (time - self._start))
         if self._last is None:
             self._last = ticks
@@ -146,7 +148,7 @@ class Video:
         stream.width, stream.height, stream.pix_fmt = width, height, "yuv420p"
         codec = stream.codec_context
         codec.time_base = Fraction(1, _TICKS)
-        codec.max_b_frames = 0  # or the first frame would come late by what they reorder
+        codec.max_b_frames = 0  # B-frames would delay the first frame by their reordering
         codec.gop_size = max(1, round(self._rate))  # a key frame, and so a fragment, a second
         codec.color_primaries = codec.color_trc = codec.colorspace = _BT709
         codec.color_range = _LIMITED_RANGE
@@ -171,10 +173,10 @@ class Video:
 
 
 def encoder_for(path: Path) -> str:
-    """The encoder that a video at `path` would be written with.
+    """Return the name of the encoder for a video at `path`.
 
     Raises:
-        InputError: another suffix, or PyAV or an encoder is missing.
+        InputError: the suffix is unknown, or PyAV or an encoder is missing.
     """
     encoders = _ENCODERS[check_suffix(path, tuple(_ENCODERS))]
     return _first_available(_import_av(path), encoders, path)[0]
@@ -193,7 +195,7 @@ def _import_av(path: Path) -> Any:
 def _first_available(
     av: Any, encoders: dict[str, dict[str, str]], path: Path
 ) -> tuple[str, dict[str, str]]:
-    """The first encoder that this FFmpeg has, and its options."""
+    """Return the first encoder that this FFmpeg has, and its options."""
     for name, options in encoders.items():
         if name in av.codecs_available:
             return name, options
@@ -204,16 +206,16 @@ def _first_available(
 
 
 def _container_options(av: Any, kind: str) -> dict[str, str]:
-    """Flags that make every second of the file readable as soon as it is written."""
+    """Return muxer flags that make every second of the file readable once it is written."""
     if kind not in ("mp4", "mov"):
-        return {"flush_packets": "1"}  # Matroska is made of clusters that stand alone
+        return {"flush_packets": "1"}  # Matroska clusters are independent
     hybrid = av.library_versions["libavformat"] >= (62,)
     flags = "hybrid_fragmented" if hybrid else "frag_keyframe+empty_moov+default_base_moof"
     return {"movflags": flags, "flush_packets": "1"}
 
 
 def _even(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """The picture with even sides, as 4:2:0 needs them: an odd one repeats its last pixels."""
+    """Pad the picture to even sides, as 4:2:0 requires, by repeating its last pixels."""
     height, width = picture.shape[:2]
     if height % 2 == 0 and width % 2 == 0:
         return picture

@@ -1,4 +1,4 @@
-"""A file that a video library writes, kept playable when writing it fails."""
+"""The file object behind a video, which stays playable when writing fails."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from pathlib import Path
 
 
 class VideoFile:
-    """The file as FFmpeg sees it, through PyAV's file interface.
+    """The file object that FFmpeg writes to, through PyAV's file interface.
 
-    A muxer that fails has left half a piece behind, and would go on writing its trailer when it is
-    closed. Once a piece has failed nothing reaches the file any more, and `close` cuts it back to
-    where it was last known to be whole.
+    A muxer that fails leaves half a piece behind, and still writes its trailer when it is closed.
+    After a failed piece, this class ignores all further writes, and `close` truncates the file to
+    the last whole piece.
 
     Attributes:
         abandoned: whether a piece has failed.
-        error: why the disk failed, which PyAV does not always pass on; None while it has not.
+        error: the error of the disk, which PyAV does not always pass on; None if there was none.
 
     Raises:
         OSError: from every method, when the disk fails.
@@ -28,10 +28,10 @@ class VideoFile:
         self._file = path.open("wb", buffering=0)
         self.abandoned = False
         self.error: OSError | None = None
-        self._whole = 0  # bytes up to where everything can be played
+        self._whole = 0  # bytes that can be played
 
     def write(self, data: bytes) -> int:
-        """Write all of `data`, or pretend to once the file is abandoned."""
+        """Write all of `data`, or ignore it once the file is abandoned."""
         rest = memoryview(data)
         try:
             while rest and not self.abandoned:
@@ -42,19 +42,19 @@ class VideoFile:
         return len(data)
 
     def seek(self, offset: int, whence: int = 0) -> int:
-        """Move to `offset` [bytes] from the start, the current place or the end."""
+        """Move to `offset` [bytes] from the start, the current position or the end."""
         return self._file.seek(offset, whence)
 
     def tell(self) -> int:
-        """The current place [bytes]."""
+        """Return the current position [bytes]."""
         return self._file.tell()
 
     @contextmanager
     def piece(self) -> Iterator[None]:
-        """A block that writes a piece which can be played; if it fails the file is abandoned."""
+        """Write a playable piece within this block; if the block fails, the file is abandoned."""
         try:
             yield
-        except BaseException:  # even Ctrl-C may have come between two halves of a piece
+        except BaseException:  # even Ctrl-C may interrupt a half-written piece
             self.abandoned = True
             raise
         if not self.abandoned:
@@ -63,7 +63,7 @@ class VideoFile:
             self._file.seek(here)
 
     def close(self) -> None:
-        """Close the file; what came after the last whole piece goes if it was abandoned."""
+        """Close the file; if it was abandoned, first truncate it to the last whole piece."""
         with self._file:
             if self.abandoned and self._path.is_file():  # and not a device
                 self._file.truncate(self._whole)

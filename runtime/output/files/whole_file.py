@@ -1,4 +1,4 @@
-"""Writing files that are never half there, and saying in one line why one cannot be written."""
+"""Atomic file writing, and one-line errors for files that cannot be written."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from devices.errors import InputError
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Turn a failure of the file system while `path` is written into one clear line.
+    """Turn file system errors within this block into one clear line about `path`.
 
     Raises:
-        InputError: instead of any OSError; it names the file and the system's reason.
+        InputError: in place of any OSError; it names the file and the system's reason.
     """
     try:
         yield
@@ -28,11 +28,11 @@ def writing(path: Path) -> Iterator[None]:
 
 
 def check_writable(path: Path) -> None:
-    """Make sure, before a show, that a file can be written at `path`; leaves nothing behind.
+    """Check, before a show, that a file can be written at `path`; leave nothing behind.
 
     Raises:
-        InputError: the folder is missing or not a folder, `path` is itself a folder, or the system
-            does not let files be made there.
+        InputError: the folder is missing or is no folder, `path` is itself a folder, or the system
+            does not allow files there.
     """
     with writing(path):
         if path.is_dir():
@@ -52,10 +52,10 @@ def check_writable(path: Path) -> None:
 
 
 def check_suffix(path: Path, known: tuple[str, ...]) -> str:
-    """The lower-case suffix of `path`, which must be one of `known`.
+    """Return the lower-case suffix of `path`, which must be one of `known`.
 
     Raises:
-        InputError: it is another; the message lists the known ones.
+        InputError: the suffix is not known; the message lists the known ones.
     """
     suffix = path.suffix.lower()
     if suffix not in known:
@@ -68,10 +68,10 @@ def check_suffix(path: Path, known: tuple[str, ...]) -> str:
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """A path to write to that becomes `path`, all at once, when the block ends without an error.
+    """Give a temporary path, and rename it to `path` when the block ends without an error.
 
-    Until then an older file at `path` stays as it is; after an error it still does, and what was
-    written is removed. A device such as ``/dev/stdout`` is written directly.
+    An older file at `path` stays until then. After an error it stays, and the temporary file is
+    removed. A device such as ``/dev/stdout`` is written directly.
 
     Raises:
         InputError: the file cannot be written.
@@ -91,5 +91,5 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 
 def _beside(path: Path) -> Path:
-    """A name that is free in the folder of `path`, hidden, with the same suffix."""
+    """Return a free, hidden name in the folder of `path`, with the same suffix."""
     return path.with_name(f".{os.getpid()}-{secrets.token_hex(4)}{path.suffix}")

@@ -1,4 +1,4 @@
-"""What a show was, in figures, as one JSON file."""
+"""The report of a show: its figures as one JSON file."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ from solvers.surface.edges import Edges
 
 
 class CharacterReport:
-    """What one character did in the show: its match, and how its surface was stretched.
+    """Figures of one character in the show: its match, and the stretch of its surface.
 
-    An `Output` of that character's frames, whose figures end up in the report.
+    An `Output` that gets the character's frames.
 
     Attributes:
-        frames: performed frames so far.
+        frames: number of performed frames so far.
     """
 
     pictures_a_second = 0.0
@@ -39,7 +39,7 @@ class CharacterReport:
         self._match: dict[str, Any] = {"score": None, "pairs": []}
 
     def matched(self, mapping: Mapping, performer: Skeleton) -> None:
-        """Set the match that the character performs with; the last one stands."""
+        """Set the match that the character performs with; the last call counts."""
         self._match = mapping_as_json(mapping, performer)
 
     def write(self, frame: PerformedFrame) -> None:
@@ -50,7 +50,7 @@ class CharacterReport:
         self.frames += 1
 
     def close(self) -> None:
-        """Do nothing: the report is written as one."""
+        """Do nothing: `Report` writes the file."""
 
     def __enter__(self) -> Self:
         return self
@@ -59,7 +59,7 @@ class CharacterReport:
         self.close()
 
     def summary(self) -> dict[str, Any]:
-        """The parts ``character``, ``match``, ``stretch`` and ``watchdog`` of the report."""
+        """Return ``character``, ``match``, ``stretch`` and ``watchdog`` of the report."""
         body = self._character
         return {
             "character": {
@@ -76,19 +76,18 @@ class CharacterReport:
 class Report:
     """Collects the figures of a show and writes them as JSON at the end.
 
-    The keys: ``frames``, ``dropped``, ``recording`` {frames, joints, seconds}, ``record`` {frames,
-    lost, fault} of the recording that was made, or null, ``character`` {vertices, faces, nodes},
+    The keys are ``frames``, ``dropped``, ``recording`` {frames, joints, seconds}, ``record`` {frames,
+    lost, fault} of the recording that the show made, or null, ``character`` {vertices, faces, nodes},
     ``match`` {score, pairs: [{source: [joint names], target: [node ids], flip}]}, ``stages_ms``
     {poll, match, retarget, deform, render, publish, frame, settle, latency: {p50, p99, max}},
     ``stretch`` {mean, p99}, ``watchdog`` {energy {p50, max}, stretch {p99, max}, inverted {max,
     last, longest, frames}}. With several characters ``character``, ``match``, ``stretch`` and
     ``watchdog`` are those of the first, and ``characters`` lists them for each, with its ``name``.
-    A value that is not a finite number is written as null: the file is JSON by the letter of
-    RFC 8259.
+    A number that is not finite is written as null, because RFC 8259 requires it.
 
     Attributes:
-        times: where the loop notes how long its stages take.
-        dropped: frames that came but were never performed.
+        times: durations of the loop's stages.
+        dropped: frames that arrived but were not performed.
 
     Args:
         path: the file to write, or None to write none.
@@ -108,7 +107,7 @@ class Report:
         self.dropped = 0
 
     def recorded(self, *, frames: int, joints: int, seconds: float) -> None:
-        """Say what was replayed; of a live source, what has come."""
+        """Set the size of the replayed recording, or of a live stream so far."""
         self._recording = {
             "frames": int(frames),
             "joints": int(joints),
@@ -116,7 +115,7 @@ class Report:
         }
 
     def kept(self, recorder: Recorder) -> None:
-        """Say what became of the recording of the show."""
+        """Set the result of the recording that the show made."""
         self._record = {
             "frames": recorder.frames,
             "lost": recorder.lost,
@@ -130,7 +129,7 @@ class Report:
         return part
 
     def summary(self) -> dict[str, Any]:
-        """Everything that `close` writes."""
+        """Return everything that `close` writes."""
         parts = [{"name": name, **part.summary()} for name, part in self._parts]
         first = {key: value for key, value in parts[0].items() if key != "name"} if parts else {}
         summary = {
@@ -147,7 +146,7 @@ class Report:
         return finite
 
     def close(self) -> None:
-        """Write the file, whole; again with the newest figures when called again.
+        """Write the whole file; another call writes it again with the newest figures.
 
         Raises:
             InputError: the disk fails.
@@ -166,7 +165,7 @@ class Report:
 
 
 def _finite(value: Any) -> Any:
-    """The same value with None for every number that JSON cannot hold."""
+    """Return the same value with None for every number that JSON cannot hold."""
     if isinstance(value, dict):
         return {key: _finite(item) for key, item in value.items()}
     if isinstance(value, list):

@@ -1,4 +1,4 @@
-"""How long each stage of a tick takes, over a whole show."""
+"""Statistics of the duration of each stage of a tick, over a whole show."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ import numpy as np
 
 STAGES = ("poll", "match", "retarget", "deform", "render", "publish", "frame", "settle", "latency")
 
-_FIRST = 1e-4  # [ms] what is shorter counts as this
+_FIRST = 1e-4  # [ms] shorter durations count as this
 _BINS_A_FOLD = 200  # for every factor of e: a bin is half a percent wide
 _BINS = 4600  # up to 10^10 times the first
 
 
 class StageTimes:
-    """Every sample of every stage, in memory that does not grow, however long the show.
+    """Counts every sample of every stage, in memory that does not grow.
 
-    A histogram whose bins are half a percent wide, and the longest sample as it was. The stages are
-    those of the report: ``poll``, ``match``, ``retarget``, ``deform``, ``render``, ``publish`` for
-    the outputs, ``frame`` for all of a tick, ``settle`` for what comes after it, and
-    ``latency`` from a frame's arrival until it is handed on to be shown, where that is known.
+    Keeps a histogram with bins half a percent wide, and the exact maximum. The stages are those of
+    the report: ``poll``, ``match``, ``retarget``, ``deform``, ``render``, ``publish`` for the
+    outputs, ``frame`` for the whole tick, ``settle`` for the work after it, and ``latency`` from
+    the arrival of a frame until it is handed to the display, where the arrival is known.
     """
 
     def __init__(self) -> None:
@@ -30,7 +30,7 @@ class StageTimes:
         self._longest = dict.fromkeys(STAGES, 0.0)
 
     def add(self, stage: str, seconds: float) -> None:
-        """Note that `stage` took `seconds` [s] once."""
+        """Add one sample of `seconds` [s] for `stage`."""
         milliseconds = 1e3 * seconds
         place = int(_BINS_A_FOLD * math.log(max(milliseconds / _FIRST, 1.0)))
         self._counts[stage][min(place, _BINS - 1)] += 1
@@ -38,13 +38,13 @@ class StageTimes:
 
     @contextmanager
     def measure(self, stage: str) -> Iterator[None]:
-        """Note how long the block takes; a block that raises does not count."""
+        """Measure this block as one sample; a block that raises does not count."""
         start = perf_counter()
         yield
         self.add(stage, perf_counter() - start)
 
     def summary(self) -> dict[str, dict[str, float]]:
-        """For each stage its p50, p99 and max [ms]; zeros for a stage that never ran."""
+        """Return p50, p99 and max [ms] of each stage; zeros for a stage that never ran."""
         return {
             stage: {
                 "p50": self._quantile(stage, 0.50),
@@ -55,7 +55,7 @@ class StageTimes:
         }
 
     def _quantile(self, stage: str, share: float) -> float:
-        """What so large a share of the samples stays under [ms]: the middle of its bin."""
+        """Return the quantile at `share` [ms]: the middle of its bin."""
         counts = np.cumsum(self._counts[stage])
         if counts[-1] == 0:
             return 0.0

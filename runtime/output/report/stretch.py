@@ -1,4 +1,4 @@
-"""How much a surface is stretched and squeezed, over a whole show."""
+"""Statistics of the edge stretch of a surface, over a whole show."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from numpy.typing import NDArray
 
 from solvers.signal.histogram import count, percentile
 
-_BIN = 1e-4  # width of a bin: what p99 is exact to
-_MOST = 10.0  # what is longer, or not a number, counts as this
+_BIN = 1e-4  # width of a bin, and so the precision of p99
+_MOST = 10.0  # larger stretch, and NaN, count as this
 
 
 class StretchStatistic:
     """Mean and 99th percentile of the relative change of edge length, |l / l0 - 1|.
 
-    Takes every edge of every frame, in memory that does not grow.
+    Counts every edge of every frame, in memory that does not grow.
     """
 
     def __init__(self) -> None:
@@ -33,5 +33,5 @@ class StretchStatistic:
 
     @property
     def p99(self) -> float:
-        """The stretch that 99 % of all edges of all frames stay under; 0 before the first."""
+        """99th percentile of the stretch over all edges of all frames; 0 before the first."""
         return float(percentile(self._counts, _BIN, 99.0))
