@@ -62,7 +62,7 @@ def _send_all(played: MotionClip, send: Send, rate: float, count: int) -> None:
 
 def _by_bridge(played: MotionClip, closing: ExitStack) -> Send:
     where = binding("tcp://127.0.0.1:*", None, option="keys")
-    publisher = BridgePublisher(where, played.skeleton, tell=lambda _: None)
+    publisher = BridgePublisher(where, played.skeleton, report=lambda _: None)
     closing.enter_context(publisher)
     print(publisher.endpoint, flush=True)
     return publisher.write

@@ -66,8 +66,8 @@ def run(options: argparse.Namespace) -> int:
         finally:
             with interrupts_deferred():
                 publisher.close()
-            audience, lost = publisher.audience, publisher.lost
-            line = f"{audience.frames} frames came, {audience.sent} went to stages"
+            subscribers, lost = publisher.subscribers, publisher.lost
+            line = f"{subscribers.frames} frames received, {subscribers.sent} sent to subscribers"
             say(line + (f", {lost} lost" if lost else ""))
     return 0
 

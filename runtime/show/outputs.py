@@ -121,7 +121,7 @@ def open_publisher(endpoint: BoundEndpoint, skeleton: Skeleton) -> BridgePublish
     Raises:
         InputError: the address cannot be bound.
     """
-    publisher = BridgePublisher(endpoint, skeleton, tell=say)
+    publisher = BridgePublisher(endpoint, skeleton, report=say)
     say(f"sending to whoever opens zmq+{publisher.endpoint}")
     return publisher
 

@@ -28,7 +28,7 @@ class NodeMotion:
     rotations: NDArray[np.float64]
 
     def local(self, skeleton: Skeleton) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Return translations (T, K, 3) and rotations (T, K, 4) of each node relative to its parent.
+        """Return the translation (T, K, 3) and rotation (T, K, 4) of each node in its parent.
 
         At rest, the axes of every node are parallel to the stage's, so the local rotations of the
         rest pose are identities. The root's parent is the stage.

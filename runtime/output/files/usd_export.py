@@ -18,10 +18,10 @@ from runtime.output.output import PerformedFrame
 class UsdExport:
     """Writes ``/Character/Surface``, with the exact points of every frame.
 
-    Coordinates are those of the stage: metres, +Y up. Vertices and faces are those of the character's file, in its
-    order. Colours, textures included, are sampled at the vertices into ``displayColor``; texture
-    coordinates are kept as ``primvars:st``. Time codes count frames at `rate`, and each frame has
-    its own time, so jitter and gaps are kept.
+    Coordinates are those of the stage: metres, +Y up. Vertices and faces are those of the
+    character's file, in its order. Colours, textures included, are sampled at the vertices into
+    ``displayColor``; texture coordinates are kept as ``primvars:st``. Time codes count frames at
+    `rate`, and each frame has its own time, so jitter and gaps are kept.
 
     The file is written at the end, in one piece.
 

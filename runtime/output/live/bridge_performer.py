@@ -1,4 +1,4 @@
-"""The performers of a show for other shows: what drives the characters, over a bridge."""
+"""Output that publishes the performers of a show to other shows, over a bridge."""
 
 from __future__ import annotations
 
@@ -16,16 +16,17 @@ from runtime.output.live.bridge_publisher import BridgePublisher
 from runtime.output.output import PerformedFrame
 
 GUESSED = 0.5
-"""Confidence of a joint that was filled in or put right, as of one that a Kinect inferred."""
-FAR = 60.0  # [s] from the host's clock; a time further off is a recording's own
+"""Confidence of a joint that was filled in or corrected, as of a Kinect's inferred joints."""
+FAR = 60.0  # [s] from the host's clock; beyond that, the times are those of a recording
 
 
 class BridgePerformer:
-    """An output that publishes each pose of each performer, whatever characters follow them.
+    """Publishes every pose of every performer, independent of the characters that they drive.
 
     Args:
-        publisher: sends each pose under its performer's number; it is closed with this.
-        clock: host monotonic time [s]; a show that is not on it, as fast as it can, is moved there.
+        publisher: sends each pose with its performer's number; it is closed with this output.
+        clock: host monotonic time [s]. The times of a show that runs on another clock, such as a
+            recording with --fast, are shifted to it.
     """
 
     pictures_a_second = 0.0
@@ -41,7 +42,7 @@ class BridgePerformer:
         self._last: tuple[Pose | None, ...] = ()
 
     def write(self, frame: PerformedFrame) -> None:
-        """Publish the poses that are others than at the last frame, the oldest first."""
+        """Publish the poses that changed since the last frame, oldest first."""
         pairs = itertools.zip_longest(frame.poses, self._last)
         fresh = [pose for pose, last in pairs if pose is not None and pose is not last]
         self._last = frame.poses
@@ -61,7 +62,7 @@ class BridgePerformer:
             )
 
     def close(self) -> None:
-        """Publish no more; may be called twice."""
+        """Stop publishing; may be called twice."""
         self._publisher.close()
 
     def __enter__(self) -> Self:

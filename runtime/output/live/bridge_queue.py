@@ -1,8 +1,8 @@
-"""What one stage of a bridge is still owed: the newest frame of each performer, or every frame.
+"""Send queues of a bridge: the newest frame of each performer, or every frame, per subscriber.
 
-Both keep to the stage's credit: as many frames are under way at once as it has room for, and what
-it has not told of having received counts as under way. So a slow network or a stage that stands
-still holds back what is sent instead of filling queues with what is past.
+Both respect the subscriber's credit: the number of unacknowledged frames never exceeds the space
+that the subscriber has. So a slow network or a stopped subscriber delays sending, and no queue
+fills up with outdated frames.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from typing import Protocol
 
 PERFORMERS = 256
 BYTES = 64 << 20
-"""What is kept of every frame: nine minutes of one body of 32 joints with rotations at 60 Hz."""
+"""Limit of a lossless queue: nine minutes of one body with 32 joints and rotations at 60 Hz."""
 
 
 @dataclass(frozen=True, slots=True)
 class Parcel:
-    """A frame as it goes out; its bytes are shared by all stages."""
+    """An encoded frame; all subscribers share its bytes."""
 
     sequence: int
     performer: int
@@ -26,40 +26,40 @@ class Parcel:
 
 
 class BridgeQueue(Protocol):
-    """The order in which frames go to one stage.
+    """The order in which frames are sent to one subscriber.
 
     Attributes:
-        sent: the highest sequence number that went out, or that the stage is not owed.
-        dropped: frames that the stage was owed and will not get.
+        sent: the highest sequence number that was sent, or that the subscriber need not get.
+        dropped: frames that the subscriber should have got and will not get.
     """
 
     sent: int
     dropped: int
 
     def offer(self, parcel: Parcel) -> None:
-        """Take in the newest frame."""
+        """Add the newest frame."""
         ...
 
     def received(self, sequence: int) -> None:
-        """Note that everything up to `sequence` has arrived."""
+        """Record that every frame up to `sequence` has arrived."""
         ...
 
     def reconnect(self, sequence: int) -> None:
-        """Note that what was under way is gone, after `sequence` has arrived."""
+        """Record that the unacknowledged frames after `sequence` are lost."""
         ...
 
     def draw(self, credit: int) -> Parcel | None:
-        """The next frame to send, if there is one and fewer than `credit` are under way."""
+        """Return the next frame to send, if fewer than `credit` frames are unacknowledged."""
         ...
 
     @property
     def empty(self) -> bool:
-        """Whether the stage has all that must not be lost."""
+        """Whether the subscriber has every frame that must not be lost."""
         ...
 
 
 class LatestQueue:
-    """The newest frame of each performer; one that is overtaken before it goes out is left out."""
+    """The newest frame of each performer; a newer frame replaces one that was not sent yet."""
 
     empty = True
 
@@ -70,7 +70,7 @@ class LatestQueue:
         self._flying: deque[int] = deque()
 
     def offer(self, parcel: Parcel) -> None:
-        """Take in the newest frame; that of the same performer which waits is dropped."""
+        """Add the newest frame; drop a waiting frame of the same performer."""
         self.dropped += self._waiting.pop(parcel.performer, None) is not None
         if len(self._waiting) >= PERFORMERS:
             self._waiting.pop(next(iter(self._waiting)))
@@ -78,17 +78,17 @@ class LatestQueue:
         self._waiting[parcel.performer] = parcel
 
     def received(self, sequence: int) -> None:
-        """Note that everything up to `sequence` has arrived."""
+        """Record that every frame up to `sequence` has arrived."""
         while self._flying and self._flying[0] <= sequence:
             self._flying.popleft()
 
     def reconnect(self, sequence: int) -> None:
-        """Forget what was under way: newer frames are better."""
+        """Forget the unacknowledged frames: newer frames replace them."""
         del sequence
         self._flying.clear()
 
     def draw(self, credit: int) -> Parcel | None:
-        """The oldest of the newest frames, so that sequence numbers rise."""
+        """Return the oldest waiting frame, so that sequence numbers increase."""
         if not self._waiting or len(self._flying) >= credit:
             return None
         parcel = self._waiting.pop(next(iter(self._waiting)))
@@ -98,7 +98,7 @@ class LatestQueue:
 
 
 class LosslessQueue:
-    """Every frame in order, kept until it arrived; beyond `limit` bytes the oldest are dropped."""
+    """Every frame in order, kept until it arrived; above `limit` bytes the oldest are dropped."""
 
     def __init__(self, sent: int, limit: int = BYTES) -> None:
         self.sent = sent
@@ -114,7 +114,7 @@ class LosslessQueue:
         return not (self._waiting or self._flying)
 
     def offer(self, parcel: Parcel) -> None:
-        """Take in the newest frame."""
+        """Add the newest frame."""
         self._waiting.append(parcel)
         self._kept += len(parcel.data)
         while self._kept > self._limit and len(self._waiting) > 1:
@@ -122,19 +122,19 @@ class LosslessQueue:
             self.dropped += 1
 
     def received(self, sequence: int) -> None:
-        """Let go of everything up to `sequence`."""
+        """Release every frame up to `sequence`."""
         while self._flying and self._flying[0].sequence <= sequence:
             self._kept -= len(self._flying.popleft().data)
 
     def reconnect(self, sequence: int) -> None:
-        """Send again what was under way and has not arrived."""
+        """Queue the unacknowledged frames again."""
         self.received(sequence)
         self._waiting.extendleft(reversed(self._flying))
         self._flying.clear()
         self.sent = min(self.sent, sequence)
 
     def draw(self, credit: int) -> Parcel | None:
-        """The oldest frame that has not gone out."""
+        """Return the oldest frame that was not sent."""
         if not self._waiting or len(self._flying) >= credit:
             return None
         parcel = self._waiting.popleft()

@@ -1,8 +1,8 @@
-"""The bridge's side of a bridge, without sockets: which stages listen, and what goes to each.
+"""The publishing end of a bridge, without sockets: its subscribers, and the messages for each.
 
-A stage is there as soon as it calls. What is said back is an answer, for its clock, and the
-skeleton until it has heard of it; so it does not matter who comes first, who comes late, or who
-starts anew.
+A subscriber is registered by its first call. The reply is an answer, for its clock, and the
+skeleton until the subscriber has confirmed it. So it does not matter whether the bridge or the
+subscriber starts first, late, or again.
 """
 
 from __future__ import annotations
@@ -25,15 +25,14 @@ from devices.bridge.messages import (
 from devices.skeleton import Skeleton, SkeletonFrame
 from runtime.output.live.bridge_queue import BridgeQueue, LatestQueue, LosslessQueue, Parcel
 
-MOST_STAGES = 32
-GONE = {True: 10.0, False: 120.0}
-"""After how long a silence [s] a stage is forgotten, one that takes the latest and one that must
-get every frame."""
+MOST_SUBSCRIBERS = 32
+SILENCE = {True: 10.0, False: 120.0}
+"""Silence [s] after which a subscriber is dropped: one in latest mode, and one in lossless mode."""
 
 
 @dataclass(slots=True)
-class _Stage:
-    """Who listens: the connection it was last heard on and when [s], what it has room for."""
+class _Subscriber:
+    """One subscriber: its connection, the time of its last call [s], its queue and credit."""
 
     route: bytes
     heard_at: float
@@ -42,21 +41,21 @@ class _Stage:
     credit: int = 0
 
     def gone(self, now: float) -> bool:
-        return now - self.heard_at > GONE[self.latest]
+        return now - self.heard_at > SILENCE[self.latest]
 
 
-class BridgeAudience:
-    """Everybody who listens to one stream of frames.
+class BridgeSubscribers:
+    """All subscribers of one stream of frames.
 
     Args:
         skeleton: of every frame.
-        clock: this machine's monotonic clock [s], that of the frames' times.
+        clock: this machine's monotonic clock [s], which the frames' times use.
 
     Attributes:
         frames: frames published.
-        sent: frames that went out, to all stages together.
-        refused: messages that were no call, or of one stage too many.
-        other_version: the version that some stage spoke last, if it was not ours.
+        sent: frames sent, to all subscribers together.
+        refused: messages that were no calls, or calls beyond `MOST_SUBSCRIBERS`.
+        other_version: the protocol version of the last subscriber with another one than ours.
 
     Raises:
         InputError: the skeleton is too large for a message.
@@ -68,90 +67,94 @@ class BridgeAudience:
         self.refused = 0
         self.other_version: int | None = None
         self._clock = clock
-        self._session = secrets.randbits(64) | 1  # never 0, which is no session
+        self._session = secrets.randbits(64) | 1  # never 0, which means no session
         self._announcement = encode_announcement(self._session, skeleton)
-        self._stages: dict[int, _Stage] = {}
-        self._lost = 0  # of stages that have gone
+        self._subscribers: dict[int, _Subscriber] = {}
+        self._lost = 0  # frames, of subscribers that have left
 
     @property
-    def stages(self) -> int:
-        """How many listen."""
-        return len(self._stages)
+    def count(self) -> int:
+        """Number of subscribers."""
+        return len(self._subscribers)
 
     @property
     def lost(self) -> int:
-        """Frames that stages which must get every one will not get."""
-        return self._lost + sum(s.queue.dropped for s in self._stages.values() if not s.latest)
+        """Frames that lossless subscribers will not get."""
+        return self._lost + sum(s.queue.dropped for s in self._subscribers.values() if not s.latest)
 
     @property
     def settled(self) -> bool:
-        """Whether every stage that must get every frame has them all."""
-        return all(stage.queue.empty for stage in self._stages.values())
+        """Whether every lossless subscriber has every frame."""
+        return all(subscriber.queue.empty for subscriber in self._subscribers.values())
 
     def publish(self, frame: SkeletonFrame) -> None:
-        """Take in the newest frame, for everybody who listens."""
+        """Queue the newest frame for every subscriber."""
         self.frames += 1
-        if self._stages:
+        if self._subscribers:
             data = encode_sample(self._session, self.frames, frame)
-            for stage in self._stages.values():
-                stage.queue.offer(Parcel(self.frames, frame.performer, data))
+            for subscriber in self._subscribers.values():
+                subscriber.queue.offer(Parcel(self.frames, frame.performer, data))
 
-    def hear(self, route: bytes, data: bytes) -> list[bytes]:
-        """Take in one message from one connection; what to say back on it. Never raises."""
+    def read(self, route: bytes, data: bytes) -> list[bytes]:
+        """Read one message from one connection, and return the replies to it. Never raises."""
         heard_at = self._clock()
         match decode(data):
             case Call() as call:
                 return self._call(route, call, heard_at)
             case OtherVersion(version):
-                # The head of a message means the same in every version: that we cannot talk.
+                # The head of a message is the same in every version, so both ends can say so.
                 self.other_version = version
                 return [encode_answer(Answer(self._session, 0, 0.0, heard_at, heard_at))]
         self.refused += 1
         return []
 
     def due(self) -> Iterator[tuple[bytes, bytes]]:
-        """Connection and bytes of each message that should go out now."""
-        for stage in self._stages.values():
-            while (parcel := stage.queue.draw(stage.credit)) is not None:
+        """Yield connection and bytes of each message to send now."""
+        for subscriber in self._subscribers.values():
+            while (parcel := subscriber.queue.draw(subscriber.credit)) is not None:
                 self.sent += 1
-                yield stage.route, parcel.data
+                yield subscriber.route, parcel.data
 
     def forget(self) -> int:
-        """Let go of stages that have been silent for long; how many those were."""
+        """Drop subscribers that have been silent for too long, and return their number."""
         now = self._clock()
-        gone = [client for client, stage in self._stages.items() if stage.gone(now)]
+        gone = [client for client, subscriber in self._subscribers.items() if subscriber.gone(now)]
         for client in gone:
             self._dismiss(client)
         return len(gone)
 
     def _dismiss(self, client: int) -> None:
-        stage = self._stages.pop(client, None)
-        if stage is not None and not stage.latest:
-            self._lost += stage.queue.dropped
+        subscriber = self._subscribers.pop(client, None)
+        if subscriber is not None and not subscriber.latest:
+            self._lost += subscriber.queue.dropped
 
     def _call(self, route: bytes, call: Call, heard_at: float) -> list[bytes]:
         if call.mode == LEAVING:
             self._dismiss(call.client)
             return []
-        stage = self._stages.get(call.client) or self._welcome(route, call, heard_at)
-        if stage is None:
+        subscriber = self._subscribers.get(call.client) or self._welcome(route, call, heard_at)
+        if subscriber is None:
             self.refused += 1
             return []
-        if stage.route != route:
-            stage.route = route
-            stage.queue.reconnect(call.received)
-        stage.queue.received(call.received)
-        stage.heard_at, stage.credit = heard_at, call.credit
+        if subscriber.route != route:
+            subscriber.route = route
+            subscriber.queue.reconnect(call.received)
+        subscriber.queue.received(call.received)
+        subscriber.heard_at, subscriber.credit = heard_at, call.credit
         answer = Answer(
-            self._session, stage.queue.sent, call.called_at, heard_at, answered_at=self._clock()
+            self._session,
+            subscriber.queue.sent,
+            call.called_at,
+            heard_at,
+            answered_at=self._clock(),
         )
-        told = call.session == self._session
-        return [encode_answer(answer), *([] if told else [self._announcement])]
+        confirmed = call.session == self._session
+        return [encode_answer(answer), *([] if confirmed else [self._announcement])]
 
-    def _welcome(self, route: bytes, call: Call, heard_at: float) -> _Stage | None:
-        if len(self._stages) >= MOST_STAGES:
+    def _welcome(self, route: bytes, call: Call, heard_at: float) -> _Subscriber | None:
+        if len(self._subscribers) >= MOST_SUBSCRIBERS:
             return None
         latest = call.mode == LATEST
         queue = LatestQueue(self.frames) if latest else LosslessQueue(self.frames)
-        self._stages[call.client] = stage = _Stage(route, heard_at, latest, queue)
-        return stage
+        self._subscribers[call.client] = subscriber = _Subscriber(route, heard_at, latest, queue)
+        return subscriber

@@ -1,4 +1,4 @@
-"""The pictures of a performance for other programs, by way of other people's libraries."""
+"""Output of pictures to other programs, through third-party libraries."""
 
 from __future__ import annotations
 
@@ -10,28 +10,28 @@ from runtime.output.pictures import Picture, fitted
 
 
 class Sender(Protocol):
-    """What takes pictures to where other programs find them."""
+    """Sends pictures to other programs."""
 
     def send(self, picture: Picture) -> None:
         """Send a picture (H, W, 4), always of the same size, with straight alpha, top row first."""
         ...
 
     def close(self) -> None:
-        """Be found no more."""
+        """Stop sending."""
         ...
 
 
 class Broadcast:
-    """An output that sends every picture, and goes on showing while no performer is seen.
+    """Sends every picture, also while no performer is seen.
 
-    A library that fails in the midst of a show is told, once, and the show goes on without it.
+    When the library fails during a show, one line reports it and the show goes on without it.
 
     Args:
-        name: what it is called where it fails.
-        sender: is closed with this.
-        size: width and height [px] of what is sent; other pictures are made to fit.
-        pictures_a_second: at most.
-        tell: takes one line on what is wrong.
+        name: the name of this output in error lines.
+        sender: closed with this output.
+        size: width and height [px] to send; other pictures are scaled to fit.
+        pictures_a_second: most pictures per second.
+        tell: takes one line that reports a failure.
     """
 
     def __init__(
@@ -60,12 +60,12 @@ class Broadcast:
             return
         try:
             self._sender.send(fitted(picture, self._size))
-        except Exception as error:  # whatever a driver or another's library may raise
+        except Exception as error:  # drivers and third-party libraries raise anything
             self._tell(f"{self._name} has stopped ({error}); the show goes on without it")
             self.close()
 
     def close(self) -> None:
-        """Send no more; may be called twice."""
+        """Stop sending; may be called twice."""
         sender, self._sender = self._sender, None
         if sender is None:
             return

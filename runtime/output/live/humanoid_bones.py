@@ -1,8 +1,8 @@
-"""Which of a performer's joints are Unity's humanoid bones, and how those bones are turned.
+"""Converts a performer's joint positions into local rotations of Unity's humanoid bones.
 
-A performer is points; a VMC model is turned by its bones. A bone turns with the one above it, by
-the least turn that brings its end to where it is; the hips, the chest and a hand with knuckles have
-a breadth as well, which says how they are turned about their own length.
+A performer has joint positions; a VMC model needs bone rotations. Each bone inherits the turn of
+its parent, plus the smallest turn that aims it at its end. The hips, the chest and a hand with
+knuckles also have a breadth direction, which gives their twist.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _SINGLE = {
 _FINGER_KINDS = dict(
     zip((Kind.THUMB, Kind.INDEX, Kind.MIDDLE, Kind.RING, Kind.LITTLE), FINGERS, strict=True)
 )
-# The bone that each one points to; where that is missing, the next.
+# The bone that each bone points to, or the next in the list where that is missing.
 _POINTS_TO: dict[str, tuple[str, ...]] = {
     "Hips": ("Spine", "Chest", "UpperChest", "Neck", "Head"),
     "Spine": ("Chest", "UpperChest", "Neck", "Head"),
@@ -64,10 +64,10 @@ _POINTS_TO: dict[str, tuple[str, ...]] = {
         )
     },
 }
-# Everybody stands in the same way at rest, but trunks and feet are jointed in different places;
-# arms may be held in any way. So these point along the performer's own rest, others a T-pose's.
+# All rest poses stand upright, but joints of trunk and feet differ between skeletons, and arms may
+# have any rest pose. So these bones use the performer's rest directions, the others a T-pose's.
 _STANDING = ("Hips", *_TRUNK, "Neck", "LeftFoot", "RightFoot")
-# From which bone to which a bone is broad; where one of them is missing, the next pair.
+# The two bones that span the breadth of a bone, or the next pair where one is missing.
 _SHOULDERS = (("RightShoulder", "LeftShoulder"), ("RightUpperArm", "LeftUpperArm"))
 _BREADTHS: dict[str, tuple[tuple[str, str], ...]] = {
     "Hips": (("RightUpperLeg", "LeftUpperLeg"),),
@@ -76,10 +76,10 @@ _BREADTHS: dict[str, tuple[tuple[str, str], ...]] = {
 
 
 def humanoid_bones(skeleton: Skeleton) -> dict[str, int]:
-    """The joint of a performer's skeleton that each humanoid bone begins at, parents first.
+    """Find the joint at the start of each humanoid bone, parents first.
 
     Raises:
-        InputError: there are no hips or no legs; VMC tells of whole bodies.
+        InputError: there are no hips or legs; VMC sends whole bodies.
     """
     parts = label_joints(skeleton)
     found: dict[str, int] = {}
@@ -102,7 +102,7 @@ def humanoid_bones(skeleton: Skeleton) -> dict[str, int]:
     human = humanoid_skeleton()
     if not {"Hips", "LeftUpperLeg", "RightUpperLeg"} <= found.keys():
         raise InputError(
-            "this performer cannot be sent by VMC, which tells of whole bodies: no hips with legs "
+            "this performer cannot be sent by VMC, which needs a whole body: no hips with legs "
             "among the joints; leave --vmc out"
         )
     return {
@@ -113,7 +113,7 @@ def humanoid_bones(skeleton: Skeleton) -> dict[str, int]:
 
 
 def _in_palm(skeleton: Skeleton, parts: Sequence[BodyPart | None], joint: int) -> bool:
-    """Whether a finger's joint is the near end of a metacarpal."""
+    """Whether a finger's joint is the near end of a metacarpal bone."""
     part = parts[joint]
     return part is not None and ("carpal" in part.word or "Metacarpal" in skeleton.names[joint])
 
@@ -135,14 +135,14 @@ def _trunk(skeleton: Skeleton, joints: Sequence[int], top: int | None) -> dict[s
 
 @dataclass(frozen=True, slots=True)
 class _Bone:
-    """How one bone's turn is found; all by index among the bones that are there.
+    """The inputs for the turn of one bone; all are indices into the bones that exist.
 
     Attributes:
-        parent: the bone above, -1 for the world.
-        end: the bone that it points to, or None to turn with its parent.
-        at_rest: the unit vector that it points along while the model stands in its T-pose.
-        breadth: from which bone to which it is broad, or None.
-        broad_at_rest: the unit vector of its breadth in a T-pose, empty without one.
+        parent: the parent bone, -1 for the world.
+        end: the bone that it points to, or None for a bone that turns with its parent.
+        at_rest: its unit direction in the model's T-pose.
+        breadth: the two bones that span its breadth, or None.
+        broad_at_rest: the unit direction of its breadth in a T-pose, empty without one.
     """
 
     parent: int
@@ -153,17 +153,17 @@ class _Bone:
 
 
 class HumanoidBones:
-    """Turns a performer's joints into the local poses of a humanoid's bones.
+    """Computes the local poses of humanoid bones from a performer's joint positions.
 
     Args:
         skeleton: the performer's.
 
     Attributes:
-        names: of the K bones that the performer has, parents first.
-        joints: (K,) the joint where each begins.
+        names: the K bones that the performer has, parents first.
+        joints: (K,) the joint at the start of each.
 
     Raises:
-        InputError: the performer is no body with hips and legs.
+        InputError: the performer has no hips and legs.
     """
 
     def __init__(self, skeleton: Skeleton) -> None:
@@ -183,7 +183,7 @@ class HumanoidBones:
         return rotate(back, at - above), multiply(back, turns)
 
     def _turns(self, at: Sequence[Vector]) -> list[Vector]:
-        """The rotation of each bone in the world since a T-pose."""
+        """The world rotation of each bone from the T-pose."""
         turns: list[Vector] = []
         for number, bone in enumerate(self._bones):
             upper = turns[bone.parent] if bone.parent >= 0 else (0.0, 0.0, 0.0, 1.0)
@@ -203,7 +203,7 @@ class HumanoidBones:
 
 
 def _bone(name: str, found: Mapping[str, int], rest: Array) -> _Bone:
-    """How the turn of one bone is found among those in `found`, of a skeleton with this rest."""
+    """Collect the inputs for one bone among those in `found`; `rest` is the rest pose (J, 3)."""
     human = humanoid_skeleton()
     number = {bone: place for place, bone in enumerate(found)}
 
@@ -243,8 +243,8 @@ def _top_of_trunk(found: Mapping[str, int]) -> str | None:
     return next((bone for bone in reversed(_TRUNK) if bone in found), None)
 
 
-# Vectors and quaternions as plain numbers: some fifty bones, each after its parent, where an array
-# of three costs more to make than to reckon with.
+# Vectors and quaternions are plain tuples: some fifty bones are computed one after another, and
+# making an array of three numbers costs more than the arithmetic.
 
 
 def _way(start: Vector, end: Vector) -> Vector:
@@ -260,13 +260,13 @@ def _dot(a: Vector, b: Vector) -> float:
 
 
 def _across(vector: Vector, axis: Vector) -> Vector:
-    """The part of a vector at right angles to a unit axis."""
+    """The component of a vector perpendicular to a unit axis."""
     along = _dot(vector, axis)
     return tuple(v - along * a for v, a in zip(vector, axis, strict=True))
 
 
 def _after(p: Vector, q: Vector) -> Vector:
-    """The rotation q, then p."""
+    """The rotation q followed by p."""
     (a, b, c, w), (x, y, z, v) = p, q
     return (
         w * x + a * v + b * z - c * y,
@@ -283,12 +283,12 @@ def _turned(q: Vector, vector: Vector) -> Vector:
 
 
 def _swing(start: Vector, end: Vector) -> Vector:
-    """The least rotation that turns one direction into another; none where one has no length."""
+    """The smallest rotation from one direction to another; the identity if one has no length."""
     lengths = math.sqrt(_dot(start, start) * _dot(end, end))
     if lengths < 1e-9:
         return (0.0, 0.0, 0.0, 1.0)
     cosine = _dot(start, end) / lengths
-    if cosine < -1.0 + 1e-9:  # any axis at right angles will do
+    if cosine < -1.0 + 1e-9:  # any perpendicular axis will do
         least = min(range(3), key=lambda axis: abs(start[axis]))
         x, y, z = _cross(start, [float(axis == least) for axis in range(3)])
         w = 0.0

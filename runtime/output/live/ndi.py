@@ -1,4 +1,4 @@
-"""Pictures over the network by NDI, which OBS, vMix and mixers take as a source, by cyndilib."""
+"""Pictures over the network by NDI, a source for OBS, vMix and video mixers; uses cyndilib."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from runtime.output.pictures import Picture
 
 
 class NdiSender:
-    """An NDI source of RGBA pictures with straight alpha; without alpha where it has none to show.
+    """An NDI source of pictures: RGBA with straight alpha, or RGBX for opaque pictures.
 
     Source: the NDI SDK's documentation of video frames: rows from the top, alpha not
     premultiplied.
 
     Args:
-        name: what receivers find it by.
+        name: the name of the source.
         size: width and height [px].
-        rate: about how many pictures a second come.
-        alpha: whether anything of the pictures is transparent.
+        rate: approximate pictures per second.
+        alpha: whether pictures have transparent areas.
 
     Raises:
-        InputError: the library is missing, or does not start.
+        InputError: the library is missing or does not start.
     """
 
     def __init__(self, name: str, size: tuple[int, int], rate: float, *, alpha: bool) -> None:
@@ -33,7 +33,7 @@ class NdiSender:
         frame.set_resolution(*size)
         frame.set_frame_rate(Fraction(rate).limit_denominator(1001))
         frame.set_fourcc(library.FourCC.RGBA if alpha else library.FourCC.RGBX)
-        # It would keep the frame rate by making the show wait.
+        # With its clock, the library would make the show wait to keep the frame rate.
         self._sender: Any = library.Sender(name, clock_video=False, clock_audio=False)
         self._sender.set_video_frame(frame)
         try:
@@ -48,15 +48,15 @@ class NdiSender:
         self._sender.write_video_async(np.ascontiguousarray(picture).reshape(-1))
 
     def close(self) -> None:
-        """Be found no more."""
+        """Remove the source."""
         self._sender.close()
 
 
 def import_cyndilib() -> Any:
-    """The library.
+    """Import the library.
 
     Raises:
-        InputError: it is missing, or NDI is not for this machine.
+        InputError: it is missing, or does not support this machine.
     """
     try:
         import cyndilib  # noqa: PLC0415  # an optional extra

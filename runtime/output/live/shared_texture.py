@@ -1,4 +1,4 @@
-"""Pictures for other programs on this machine: by Spout on Windows, by Syphon on macOS."""
+"""Pictures for other programs on this machine, by Spout (Windows) or Syphon (macOS)."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ _GL_RGBA = 0x1908
 
 
 class SpoutSender:
-    """A Spout sender of RGBA pictures with straight alpha, which OBS's Spout source expects.
+    """A Spout sender of RGBA pictures with straight alpha, as OBS's Spout source expects.
 
-    It shares a texture of the OpenGL context that is current when the first picture is sent.
+    It shares a texture of the OpenGL context that is current at the first picture.
     """
 
     def __init__(self, library: Any, name: str) -> None:
@@ -35,7 +35,7 @@ class SpoutSender:
         self._sender.setFrameSync(self._name)
 
     def close(self) -> None:
-        """Be found no more."""
+        """Stop sharing."""
         self._sender.releaseSender()
 
 
@@ -48,23 +48,23 @@ class SyphonSender:
         self._texture: Any = self._raw.create_mtl_texture(self._server.device, *size)
 
     def send(self, picture: Picture) -> None:
-        """Send a picture (H, W, 4); for Syphon the first row is the lowest."""
+        """Send a picture (H, W, 4); Syphon's first row is at the bottom."""
         data = np.ascontiguousarray(premultiplied(picture)).tobytes()
         self._raw.copy_bytes_to_mtl_texture(data, self._texture)
         self._server.publish_frame_texture(self._texture, is_flipped=True)
 
     def close(self) -> None:
-        """Be found no more."""
+        """Stop sharing."""
         self._server.stop()
 
 
 def open_shared_texture(
     name: str, size: tuple[int, int], *, platform: str = sys.platform
 ) -> Sender:
-    """What shares pictures of `size`, width and height [px], under a name on this platform.
+    """Open a sender of pictures of `size`, width and height [px], for this platform.
 
     Raises:
-        InputError: there is nothing of the kind here, its library is missing, or does not start.
+        InputError: this platform has none, or its library is missing or does not start.
     """
     library = import_shared_texture(platform)
     try:
@@ -78,10 +78,10 @@ def open_shared_texture(
 
 
 def import_shared_texture(platform: str = sys.platform) -> Any:
-    """The library for this platform.
+    """Import the library for this platform.
 
     Raises:
-        InputError: it is missing, or there is none.
+        InputError: it is missing, or this platform has none.
     """
     if platform not in ("win32", "darwin"):
         raise InputError(

@@ -1,4 +1,4 @@
-"""A virtual camera, which video calls and OBS take for a real one, by pyvirtualcam."""
+"""A virtual camera for video calls and OBS; uses pyvirtualcam."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ _SETUP = {
 
 
 class VirtualCamera:
-    """A virtual camera that shows pictures on black, as RGB.
+    """A virtual camera that shows pictures over black, as RGB.
 
     Args:
-        name: a device such as ``/dev/video2`` or ``OBS Virtual Camera``; empty: the first there is.
+        name: a device such as ``/dev/video2`` or ``OBS Virtual Camera``; empty for the first one.
         size: width and height [px].
-        rate: about how many pictures a second come.
+        rate: approximate pictures per second.
 
     Raises:
-        InputError: the library is missing, or there is no such camera.
+        InputError: the library is missing, or no such camera exists.
     """
 
     def __init__(self, name: str, size: tuple[int, int], rate: float) -> None:
@@ -38,7 +38,7 @@ class VirtualCamera:
                 fmt=library.PixelFormat.RGB,
                 device=name or None,
             )
-        except RuntimeError as error:  # all that its backends raise ends up as one
+        except RuntimeError as error:  # all its backends raise this
             called = f" called {name!r}" if name else ""
             setup = _SETUP.get(sys.platform, _SETUP["linux"])
             raise InputError(
@@ -50,12 +50,12 @@ class VirtualCamera:
         self._camera.send(on_black(picture))
 
     def close(self) -> None:
-        """Give the camera back."""
+        """Release the camera."""
         self._camera.close()
 
 
 def import_pyvirtualcam() -> Any:
-    """The library.
+    """Import the library.
 
     Raises:
         InputError: it is missing.

@@ -1,4 +1,4 @@
-"""The tracked performer for other programs: a VMC performer that sends to a marionette.
+"""Output of the first performer as VMC: the VMC role "performer", which sends to a "marionette".
 
 Source: sh-akira/VirtualMotionCaptureProtocol, performer specification: per frame the root, the
 bones, OK and the time, in bundles of at most 1500 bytes with their UDP and IP headers.
@@ -25,20 +25,19 @@ _UNMOVED = (0.0,) * 6 + (1.0,)
 
 
 class VmcPerformer:
-    """An output that sends the first performer's newest pose as VMC, whatever character follows it.
+    """Sends the newest pose of the first performer as VMC, independent of the characters.
 
-    A datagram that cannot be sent is gone, as UDP has it, and counted; a show never waits for
-    who listens.
+    A datagram that cannot be sent is lost and counted; a show never waits for a receiver.
 
     Args:
-        skeleton: of the performer; the protocol knows one performer at a port.
-        host, port: where the marionette listens.
+        skeleton: the performer's; the protocol has one performer per port.
+        host, port: the address of the marionette.
 
     Attributes:
-        lost: datagrams that the system did not take.
+        lost: datagrams that the system did not accept.
 
     Raises:
-        InputError: no host is called that, or the performer is no body with hips and legs.
+        InputError: the host is unknown, or the performer has no hips and legs.
     """
 
     pictures_a_second = 0.0
@@ -55,7 +54,7 @@ class VmcPerformer:
         self._socket, self._target = _socket_to(host, port)
 
     def write(self, frame: PerformedFrame) -> None:
-        """Send the pose of the first performer at this frame."""
+        """Send the first performer's pose of this frame."""
         pose = frame.poses[0]
         if pose is None:
             return
@@ -70,11 +69,11 @@ class VmcPerformer:
         for bundle in write_bundles(messages, LONGEST):
             try:
                 self._socket.sendto(bundle, self._target)
-            except OSError:  # nobody there, or the queue is full
+            except OSError:  # no receiver, or the queue is full
                 self.lost += 1
 
     def close(self) -> None:
-        """Send no more; may be called twice."""
+        """Stop sending; may be called twice."""
         self._socket.close()
 
     def __enter__(self) -> Self:

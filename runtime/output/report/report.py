@@ -76,14 +76,14 @@ class CharacterReport:
 class Report:
     """Collects the figures of a show and writes them as JSON at the end.
 
-    The keys are ``frames``, ``dropped``, ``recording`` {frames, joints, seconds}, ``record`` {frames,
-    lost, fault} of the recording that the show made, or null, ``character`` {vertices, faces, nodes},
-    ``match`` {score, pairs: [{source: [joint names], target: [node ids], flip}]}, ``stages_ms``
-    {poll, match, retarget, deform, render, publish, frame, settle, latency: {p50, p99, max}},
-    ``stretch`` {mean, p99}, ``watchdog`` {energy {p50, max}, stretch {p99, max}, inverted {max,
-    last, longest, frames}}. With several characters ``character``, ``match``, ``stretch`` and
-    ``watchdog`` are those of the first, and ``characters`` lists them for each, with its ``name``.
-    A number that is not finite is written as null, because RFC 8259 requires it.
+    The keys are ``frames``, ``dropped``, ``recording`` {frames, joints, seconds}, ``record``
+    {frames, lost, fault} of the recording that the show made, or null, ``character`` {vertices,
+    faces, nodes}, ``match`` {score, pairs: [{source: [joint names], target: [node ids], flip}]},
+    ``stages_ms`` {poll, match, retarget, deform, render, publish, frame, settle, latency: {p50,
+    p99, max}}, ``stretch`` {mean, p99}, ``watchdog`` {energy {p50, max}, stretch {p99, max},
+    inverted {max, last, longest, frames}}. With several characters ``character``, ``match``,
+    ``stretch`` and ``watchdog`` are those of the first, and ``characters`` lists them for each,
+    with its ``name``. A number that is not finite is written as null, because RFC 8259 requires it.
 
     Attributes:
         times: durations of the loop's stages.

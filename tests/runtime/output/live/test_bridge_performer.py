@@ -34,7 +34,7 @@ from tests.waiting import PATIENCE
 @pytest.fixture
 def publisher() -> Iterator[BridgePublisher]:
     with BridgePublisher(
-        binding("tcp://127.0.0.1:*", None, option="--publish-keys DIR"), BODY, tell=lambda _: None
+        binding("tcp://127.0.0.1:*", None, option="--publish-keys DIR"), BODY, report=lambda _: None
     ) as opened:
         yield opened
 

@@ -24,7 +24,7 @@ from devices.bridge.receiver import BEAT, CREDIT, BridgeReceiver
 from devices.builtin.body import builtin_skeleton
 from devices.skeleton import Skeleton, SkeletonFrame
 from runtime.output.live.bridge_queue import LosslessQueue, Parcel
-from runtime.output.live.bridge_subscribers import GONE, MOST_STAGES, BridgeAudience
+from runtime.output.live.bridge_subscribers import MOST_SUBSCRIBERS, SILENCE, BridgeSubscribers
 
 BODY = Skeleton(("hips", "hand"), np.array([-1, 0]), np.array([[0.0, 1.0, 0.0], [0.5, 1.0, 0.0]]))
 
@@ -50,24 +50,24 @@ class Wire:
     ) -> None:
         self.now = 1000.0  # on the stage
         self.offset, self.there, self.back = offset, there, back
-        self.audience = self.new_bridge()
+        self.subscribers = self.new_bridge()
         self.receiver = BridgeReceiver(mode)
         self.route = b"one"
         self.under_way: list[bytes] = []  # to the stage
         self.heard: list[SkeletonFrame] = []
 
-    def new_bridge(self) -> BridgeAudience:
-        self.audience = BridgeAudience(BODY, lambda: self.now + self.offset)
-        return self.audience
+    def new_bridge(self) -> BridgeSubscribers:
+        self.subscribers = BridgeSubscribers(BODY, lambda: self.now + self.offset)
+        return self.subscribers
 
     def call(self, waiting: int = 0) -> None:
         data = self.receiver.call(self.now, waiting)
         self.now += self.there
-        self.under_way += self.audience.hear(self.route, data)
+        self.under_way += self.subscribers.read(self.route, data)
         self.load()
 
     def load(self) -> None:
-        self.under_way += [data for _, data in self.audience.due()]
+        self.under_way += [data for _, data in self.subscribers.due()]
 
     def deliver(self) -> list[SkeletonFrame]:
         self.now += self.back
@@ -84,14 +84,14 @@ class Wire:
 @pytest.mark.parametrize("mode", [LATEST, LOSSLESS])
 def test_a_stage_that_calls_gets_skeleton_and_frames(mode: int) -> None:
     wire = Wire(mode)
-    wire.audience.publish(frame(1))
+    wire.subscribers.publish(frame(1))
     assert wire.exchange() == [], "what was before it came, it is not owed"
     skeleton = wire.receiver.skeleton
     assert skeleton is not None
     assert skeleton.names == BODY.names
     wire.call()
     for number in (2, 3):
-        wire.audience.publish(frame(number))
+        wire.subscribers.publish(frame(number))
         wire.load()
     assert [number_of(one) for one in wire.deliver()] == [2, 3]
     assert wire.receiver.lost == wire.receiver.refused == 0
@@ -115,7 +115,7 @@ def test_times_are_on_the_stages_clock_whatever_the_bridges_shows() -> None:
         wire.exchange()
     wire.call()
     truth = wire.now - 0.01
-    wire.audience.publish(frame(5, time=truth + wire.offset))
+    wire.subscribers.publish(frame(5, time=truth + wire.offset))
     wire.load()
     (heard,) = wire.deliver()
     assert heard.time == pytest.approx(truth, abs=1e-6)
@@ -131,7 +131,7 @@ def test_uneven_ways_shift_times_by_half_the_difference_at_most(there: float, ba
     assert error == pytest.approx((there - back) / 2.0, abs=1e-6)
     assert abs(error) <= wire.receiver.clock.bound == pytest.approx((there + back) / 2.0, rel=0.01)
     wire.call()
-    wire.audience.publish(frame(1, time=wire.now + 77.0))
+    wire.subscribers.publish(frame(1, time=wire.now + 77.0))
     wire.load()
     assert wire.deliver()[0].time <= wire.now, "never after it came"
 
@@ -143,7 +143,7 @@ def test_the_latest_wins_for_each_performer_where_the_way_is_slow() -> None:
     wire.deliver()
     credit = CREDIT[LATEST]
     for number in range(1, 501):
-        wire.audience.publish(frame(number, performer=number % 2))
+        wire.subscribers.publish(frame(number, performer=number % 2))
         wire.load()
     first = wire.deliver()
     assert [number_of(one) for one in first] == list(range(1, credit + 1)), "as many as fit"
@@ -152,7 +152,7 @@ def test_the_latest_wins_for_each_performer_where_the_way_is_slow() -> None:
     assert [number_of(one) for one in newest] == [499, 500], "then the newest of each"
     assert [one.performer for one in newest] == [1, 0]
     assert wire.receiver.lost == 500 - credit - 2
-    assert wire.audience.lost == 0, "nobody was owed them"
+    assert wire.subscribers.lost == 0, "nobody was owed them"
 
 
 def test_nothing_is_lost_where_nothing_may_be() -> None:
@@ -166,7 +166,7 @@ def test_nothing_is_lost_where_nothing_may_be() -> None:
     for _ in range(2000):
         for _ in range(min(rng.randint(0, 400), 10_000 - published)):
             published += 1
-            wire.audience.publish(frame(published))
+            wire.subscribers.publish(frame(published))
         wire.call(waiting=len(inbox))
         inbox += wire.deliver()
         assert len(inbox) <= CREDIT[LOSSLESS], "no more comes than there is room for"
@@ -174,9 +174,9 @@ def test_nothing_is_lost_where_nothing_may_be() -> None:
             taken += [number_of(one) for one in inbox]
             inbox.clear()
     assert taken == list(range(1, 10_001))
-    assert wire.receiver.lost == wire.audience.lost == 0
+    assert wire.receiver.lost == wire.subscribers.lost == 0
     wire.exchange()
-    assert wire.audience.settled
+    assert wire.subscribers.settled
 
 
 def test_what_was_under_way_when_the_line_broke_is_sent_again() -> None:
@@ -184,7 +184,7 @@ def test_what_was_under_way_when_the_line_broke_is_sent_again() -> None:
     wire = Wire(LOSSLESS)
     wire.exchange()
     for number in range(1, 2001):
-        wire.audience.publish(frame(number))
+        wire.subscribers.publish(frame(number))
         wire.load()
         if rng.random() < 0.05:
             wire.under_way = wire.under_way[: rng.randint(0, len(wire.under_way))]
@@ -205,11 +205,11 @@ def test_where_the_latest_win_a_broken_line_costs_what_was_on_it() -> None:
     wire.exchange()
     wire.call()
     for number in range(1, 11):
-        wire.audience.publish(frame(number))
+        wire.subscribers.publish(frame(number))
         wire.load()
     wire.under_way, wire.route = [], b"two"
     wire.exchange()
-    wire.audience.publish(frame(11))
+    wire.subscribers.publish(frame(11))
     wire.load()
     assert [number_of(one) for one in wire.deliver()] == [11]
     assert wire.receiver.lost == 10
@@ -219,7 +219,7 @@ def test_a_bridge_that_starts_anew_goes_on_with_the_show() -> None:
     wire = Wire(LOSSLESS, offset=10.0)
     wire.exchange()
     for number in range(1, 100):
-        wire.audience.publish(frame(number))
+        wire.subscribers.publish(frame(number))
     wire.exchange()
     first_session = wire.receiver.session
     wire.offset = -999.0  # another machine's clock
@@ -229,7 +229,7 @@ def test_a_bridge_that_starts_anew_goes_on_with_the_show() -> None:
     wire.call()
     truth = wire.now
     for number in range(1, 4):
-        wire.audience.publish(frame(number, time=truth + wire.offset))
+        wire.subscribers.publish(frame(number, time=truth + wire.offset))
     wire.load()
     heard = wire.deliver()
     assert [number_of(one) for one in heard] == [1, 2, 3], "its numbers start from the front"
@@ -240,10 +240,10 @@ def test_a_bridge_that_starts_anew_goes_on_with_the_show() -> None:
 def test_another_skeleton_is_refused_and_told() -> None:
     wire = Wire(LATEST)
     wire.exchange()
-    wire.audience = BridgeAudience(builtin_skeleton(), lambda: wire.now)
+    wire.subscribers = BridgeSubscribers(builtin_skeleton(), lambda: wire.now)
     wire.exchange()
     assert wire.receiver.strange
-    wire.audience.publish(frame(1))
+    wire.subscribers.publish(frame(1))
     assert wire.exchange() == []
     assert wire.receiver.skeleton is not None
     assert wire.receiver.skeleton.names == BODY.names
@@ -267,8 +267,8 @@ def test_both_sides_notice_another_version() -> None:
     wire = Wire(LATEST)
     data = bytearray(wire.receiver.call(wire.now))
     data[4] = VERSION + 1
-    (reply,) = wire.audience.hear(b"one", bytes(data))
-    assert wire.audience.other_version == VERSION + 1
+    (reply,) = wire.subscribers.read(b"one", bytes(data))
+    assert wire.subscribers.other_version == VERSION + 1
     reply = bytearray(reply)
     reply[4] = VERSION + 3  # what a bridge of that version would have said
     assert wire.receiver.feed(bytes(reply), wire.now) == []
@@ -285,11 +285,11 @@ def test_a_stage_calls_in_a_steady_beat_and_before_it_runs_dry() -> None:
     assert not wire.receiver.call_due(wire.now + BEAT * 0.9)
     assert wire.receiver.call_due(wire.now + BEAT)
     for number in range(1, CREDIT[LOSSLESS] // 4):
-        wire.audience.publish(frame(number))
+        wire.subscribers.publish(frame(number))
     wire.load()
     wire.deliver()
     assert not wire.receiver.call_due(wire.now)
-    wire.audience.publish(frame(0))
+    wire.subscribers.publish(frame(0))
     wire.load()
     wire.deliver()
     assert wire.receiver.call_due(wire.now)
@@ -298,30 +298,30 @@ def test_a_stage_calls_in_a_steady_beat_and_before_it_runs_dry() -> None:
 
 def test_silent_stages_are_forgotten_and_places_are_few() -> None:
     wire = Wire(LATEST)
-    for client in range(1, MOST_STAGES + 5):
-        wire.audience.hear(b"r%d" % client, encode_call(Call(client, 0, 0, 0.0, 4, LATEST)))
-    assert wire.audience.stages == MOST_STAGES
-    assert wire.audience.refused == 4
-    assert wire.audience.forget() == 0
-    wire.now += GONE[True] + 1.0
-    assert wire.audience.forget() == MOST_STAGES
+    for client in range(1, MOST_SUBSCRIBERS + 5):
+        wire.subscribers.read(b"r%d" % client, encode_call(Call(client, 0, 0, 0.0, 4, LATEST)))
+    assert wire.subscribers.count == MOST_SUBSCRIBERS
+    assert wire.subscribers.refused == 4
+    assert wire.subscribers.forget() == 0
+    wire.now += SILENCE[True] + 1.0
+    assert wire.subscribers.forget() == MOST_SUBSCRIBERS
     wire.exchange()
-    assert wire.audience.stages == 1
-    wire.audience.hear(b"one", wire.receiver.farewell(wire.now))
-    assert wire.audience.stages == 0
+    assert wire.subscribers.count == 1
+    wire.subscribers.read(b"one", wire.receiver.farewell(wire.now))
+    assert wire.subscribers.count == 0
     wire.exchange()
-    assert wire.audience.stages == 1, "who calls again is there again"
+    assert wire.subscribers.count == 1, "who calls again is there again"
 
 
 def test_a_stage_that_was_forgotten_counts_what_it_missed() -> None:
     wire = Wire(LOSSLESS)
     wire.exchange()
-    wire.now += GONE[False] + 1.0
-    assert wire.audience.forget() == 1
+    wire.now += SILENCE[False] + 1.0
+    assert wire.subscribers.forget() == 1
     for number in range(1, 51):
-        wire.audience.publish(frame(number))
+        wire.subscribers.publish(frame(number))
     wire.exchange()
-    wire.audience.publish(frame(51))
+    wire.subscribers.publish(frame(51))
     wire.load()
     assert [number_of(one) for one in wire.deliver()] == [51]
     assert wire.receiver.lost == 50
@@ -361,16 +361,16 @@ def test_noise_moves_neither_side() -> None:
         data = bytearray(rng.choice(seeds))
         for _ in range(rng.randint(1, 8)):
             data[rng.randrange(len(data))] = rng.randrange(256)
-        wire.audience.hear(rng.randbytes(5), bytes(data))
+        wire.subscribers.read(rng.randbytes(5), bytes(data))
         wire.receiver.feed(bytes(data), wire.now)
-    assert wire.audience.stages <= MOST_STAGES
-    assert wire.audience.refused > 0
+    assert wire.subscribers.count <= MOST_SUBSCRIBERS
+    assert wire.subscribers.refused > 0
     assert wire.receiver.refused > 0
     for _ in range(10):
         wire.now += 1.0
         wire.exchange()
     for number in range(1, 6):
-        wire.audience.publish(frame(number, time=wire.now))
+        wire.subscribers.publish(frame(number, time=wire.now))
     wire.heard.clear()
     wire.exchange()
     assert [number_of(one) for one in wire.heard] == [1, 2, 3, 4, 5]
@@ -384,7 +384,7 @@ def test_a_decoded_frame_is_what_was_published() -> None:
     hidden = np.array([[np.nan] * 3, [1.0, 2.0, 3.0]])
     turns = np.array([[np.nan] * 4, [0.0, 0.6, 0.0, 0.8]])
     said = SkeletonFrame(wire.now, hidden, turns, np.array([0.0, 0.25]), performer=31)
-    wire.audience.publish(said)
+    wire.subscribers.publish(said)
     wire.load()
     message = decode(wire.under_way[0])
     assert isinstance(message, Sample)
