@@ -188,7 +188,7 @@ def test_hands_alone_are_refused_in_one_line() -> None:
     hands = landmark_skeleton(
         [f"{side}_{name}" for side in ("left", "right") for name in HAND_LANDMARKS]
     )
-    with pytest.raises(InputError, match="whole bodies") as refused:
+    with pytest.raises(InputError, match="a whole body") as refused:
         VmcPerformer(hands, "127.0.0.1", 1)
     assert "\n" not in str(refused.value)
 
