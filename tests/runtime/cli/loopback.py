@@ -61,7 +61,7 @@ def bridge(
     clock: Callable[[], float] = time.monotonic,
 ) -> Iterator[BridgePublisher]:
     where = binding(bind, keys, option="--keys DIR")
-    with BridgePublisher(where, BODY, tell=told or Told(), clock=clock) as publisher:
+    with BridgePublisher(where, BODY, report=told or Told(), clock=clock) as publisher:
         yield publisher
 
 

@@ -143,7 +143,7 @@ def test_a_stage_of_another_version_is_told_and_tells() -> None:
         assert socket.poll(int(PATIENCE * 1000))
         reply = bytearray(socket.recv())
         assert reply[4] == VERSION, "so that the other side can name us"
-        told.wait_for("speaks version 9")
+        told.wait_for("uses version 9")
     reply[4] = 9
     assert decode(bytes(reply)) == OtherVersion(9)
 
@@ -159,7 +159,7 @@ def test_a_flood_from_a_stranger_leaves_the_bridge_serving() -> None:
                 with_room = socket.poll(10, zmq.POLLOUT)
                 if with_room:
                     socket.send(data, zmq.NOBLOCK)
-            if publisher.audience.stages == 2:
+            if publisher.subscribers.count == 2:
                 served.set()
 
     with (
@@ -177,8 +177,8 @@ def test_a_flood_from_a_stranger_leaves_the_bridge_serving() -> None:
         finally:
             stop.set()
             flooding.join(PATIENCE)
-        assert publisher.audience.refused > 0
-        assert publisher.audience.stages == 2
+        assert publisher.subscribers.refused > 0
+        assert publisher.subscribers.count == 2
 
 
 def test_closing_is_quick_quiet_and_may_come_twice() -> None:

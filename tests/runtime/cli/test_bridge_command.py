@@ -57,8 +57,8 @@ def test_ctrl_c_ends_a_bridge_with_a_word_on_what_it_did(tmp_path: Path) -> None
     finally:
         process.kill()
     assert process.returncode == 130, said
-    assert "frames came" in said.splitlines()[-1]
-    assert "went to stages" in said.splitlines()[-1]
+    assert "frames received" in said.splitlines()[-1]
+    assert "sent to subscribers" in said.splitlines()[-1]
     assert "Traceback" not in said
 
 

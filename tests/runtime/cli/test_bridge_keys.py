@@ -50,7 +50,7 @@ def test_the_right_keys_open_and_the_wrong_ones_get_nothing(tmp_path: Path) -> N
         with pytest.raises(InputError, match="one side has keys and the other has none"):
             open_device(urlsplit(f"{url}?wait=5"))
         told.wait_for("one side has keys and the other has none")
-        assert publisher.audience.sent == 1, "nobody else got anything"
+        assert publisher.subscribers.sent == 1, "nobody else got anything"
 
 
 def test_nothing_leaves_this_machine_without_keys(tmp_path: Path) -> None:
