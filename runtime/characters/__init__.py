@@ -1,1 +1,1 @@
-"""Where characters come from: files of any kind, and those that ship with Bunraku."""
+"""Characters: read from mesh and rig files, or built in."""

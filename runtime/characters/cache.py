@@ -1,4 +1,4 @@
-"""Skeletons that were extracted before, kept in the user's cache folder by what they came from."""
+"""Keep extracted skeletons in the user's cache folder, by a hash of their mesh."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ MOST_BYTES = 1 << 20
 def cached_skeleton(
     vertices: NDArray[np.float64], faces: NDArray[np.int64], extract: Extract, version: int
 ) -> Tree:
-    """What `extract(vertices, faces)` gives, from the cache where it was computed before.
+    """Return `extract(vertices, faces)`, from the cache if it holds the result.
 
-    Vertices (N, 3) and faces (F, 3) are hashed bit by bit, together with the version of the
-    extraction. A damaged file is computed anew; a folder that cannot be written is no error.
+    The key is a hash of all bits of vertices (N, 3) and faces (F, 3) and of the version of the
+    extraction. A damaged cache file is computed anew; a folder that cannot be written is no error.
     """
     path = cache_folder() / "skeletons" / f"{_key(vertices, faces, version)}.npz"
     tree = _stored(path)
@@ -71,7 +71,7 @@ def _is_tree(parents: NDArray[np.int64]) -> bool:
 
 
 def _store(path: Path, tree: Tree) -> None:
-    """Write beside, then rename: another process never sees half a file."""
+    """Write to a temporary file, then rename: another process never sees half a file."""
     path.parent.mkdir(parents=True, exist_ok=True)
     handle, name = tempfile.mkstemp(dir=path.parent, suffix=".part")
     try:

@@ -1,4 +1,4 @@
-"""A character: a surface to deform, the skeleton it is matched by, and what it looks like."""
+"""The type of a character: a surface to deform, a skeleton to match, and its look."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from devices.skeleton import Skeleton
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Material:
-    """How a part of the surface looks.
+    """The colour and texture of some faces.
 
     Attributes:
-        color: (4,) linear RGBA in [0, 1], multiplies texture and vertex colours.
+        color: (4,) linear RGBA in [0, 1]; multiplies texture and vertex colours.
         texture: (h, w, 4) uint8 sRGB image, first row at v = 0 as glTF has it, or None.
     """
 
@@ -26,14 +26,14 @@ class Material:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Surface:
-    """The surface as its file has it, with seams split, for drawing and for the point cache.
+    """The surface with seams split as in its file, for drawing and for the point cache.
 
     Attributes:
-        vertex: (M,) int; which vertex of the welded character each file vertex is, file order.
+        vertex: (M,) int; index of each file vertex in the welded character, in file order.
         faces: (F, 3) int32 into the M file vertices, in the same order as the character's faces.
         colors: (M, 4) float32 linear RGBA in [0, 1].
         uvs: (M, 2) float32 texture coordinates, or None.
-        materials: what the faces are made of, at least one.
+        materials: at least one.
         face_material: (F,) int into `materials`.
     """
 
@@ -50,16 +50,16 @@ class Character:
     """A character in its rest pose on the stage: metres, +Y up, facing +Z, standing on y = 0.
 
     Attributes:
-        name: what it is called.
+        name: for people.
         vertices: (N, 3) [m] welded rest positions.
         faces: (F, 3) int64 into `vertices`; may have boundaries, several components, degenerate
             triangles and non-manifold edges.
         skeleton: its nodes as a tree, from the file's rig or extracted from the surface.
         weights: (N, K) skin weights of the file's rig, rows sum to 1, or None.
-        surface: what is drawn.
+        surface: for drawing.
         placement: (4, 4) takes file coordinates to stage coordinates: rotation, uniform scale,
             translation.
-        notes: what was guessed or mended, one short line each.
+        notes: guesses and repairs, one short line each.
     """
 
     name: str
@@ -72,7 +72,7 @@ class Character:
     notes: tuple[str, ...] = ()
 
     def in_file_coordinates(self, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Take deformed welded vertices (N, 3) back to file vertices (M, 3) in the file's frame."""
+        """Return file vertices (M, 3) in the file's frame for deformed welded vertices (N, 3)."""
         to_file = np.asarray(np.linalg.inv(self.placement), dtype=np.float64)
         placed: NDArray[np.float64] = vertices[self.surface.vertex] @ to_file[:3, :3].T
         return placed + to_file[:3, 3]

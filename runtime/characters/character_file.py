@@ -1,4 +1,4 @@
-"""Characters from files: read, welded, put on the stage, with a skeleton in every case."""
+"""Read characters from mesh and rig files: welded, placed on the stage, always with a skeleton."""
 
 from __future__ import annotations
 
@@ -32,7 +32,10 @@ SUFFIXES = MESH_SUFFIXES + RIG_SUFFIXES
 
 
 def read_character(path: Path) -> Character:
-    """The character in a mesh or rig file, on the stage, with its rig or an extracted skeleton.
+    """Read the character in a mesh or rig file, as the file has it, and place it on the stage.
+
+    A file without a rig gets a skeleton extracted from its surface. `load_character` also knows
+    built-in characters and prepares what it reads for performing.
 
     Raises:
         InputError: there is no such file, its format is not known, or it holds no usable surface.
@@ -57,7 +60,7 @@ def _from_mesh(path: Path) -> Character:
 
 
 def _from_rig(path: Path) -> Character:
-    """glTF says which way is up, VRM which way is forward: nothing to guess."""
+    """glTF defines which way is up, VRM which way is forward: nothing is guessed."""
     model = read_gltf(path)
     mesh = FileMesh(
         model.file_vertices,
@@ -86,7 +89,7 @@ def _standing(
     rotation: NDArray[np.float64],
     rig: tuple[Skeleton, csr_array] | None = None,
 ) -> Character:
-    """The character on the stage; the rig's joints and weights (M, K) are the file's."""
+    """Build the character on the stage; the rig holds the file's joints and weights (M, K)."""
     welded, faces = mesh.vertices[first_occurrences(vertex)], vertex[mesh.faces]
     placement = placement_matrix(rotation, welded[np.unique(faces)])
     vertices = placed(placement, welded)

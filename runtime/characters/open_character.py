@@ -1,27 +1,33 @@
-"""Who can go on stage: files of meshes and rigs, and the characters that come with the program."""
+"""Load characters by name or file: the entry point for everything that performs."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
 from runtime.characters.builtin import BUILTIN, builtin_character
-from runtime.characters.bundles import unbundled
 from runtime.characters.character import Character
 from runtime.characters.character_file import SUFFIXES, read_character
-from runtime.characters.side_view import seen_from_best_side
+from runtime.characters.parallel_bones import split_parallel_bones
+from runtime.characters.side_view import turned_to_best_side
 
 
 def is_character(name: str) -> bool:
-    """Whether `name` is a built-in character or looks like the file of one."""
+    """Whether `name` is a built-in character or has the suffix of a character file."""
     return name in BUILTIN or Path(name).suffix.lower() in SUFFIXES
 
 
 def load_character(name: str | Path) -> Character:
-    """The built-in character or the character in the file called `name`.
+    """Return a character ready to perform: built-in, or read from a mesh or rig file.
+
+    A file's character is read by `read_character`; then parallel bones are split, and a long
+    character, such as a camel, is turned to show its side.
+
+    Args:
+        name: of a built-in character, or the path of a file.
 
     Raises:
         InputError: there is no such file or built-in character, or the file cannot be used.
     """
     if str(name) in BUILTIN:
         return builtin_character(str(name))
-    return seen_from_best_side(unbundled(read_character(Path(name))))
+    return turned_to_best_side(split_parallel_bones(read_character(Path(name))))

@@ -1,4 +1,4 @@
-"""Colours for what its file leaves without any, and the way from encoded to linear colours."""
+"""Default colours for meshes without any, and the conversion from sRGB to linear colours."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import hashlib
 import numpy as np
 from numpy.typing import NDArray
 
-PALETTE = (  # sRGB: clear on a dark stage, none of them a skin tone or a warning
+PALETTE = (  # sRGB: visible on a dark stage; no skin tones, no warning colours
     (0xE0, 0x7A, 0x5F),  # terracotta
     (0x3D, 0xA5, 0xA0),  # teal
     (0xE9, 0xB4, 0x4C),  # marigold
@@ -29,7 +29,7 @@ def linear_from_srgb(encoded: NDArray[np.float64]) -> NDArray[np.float32]:
 
 
 def palette_color(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float32]:
-    """A linear RGBA (4,) that the same surface always gets: vertices (N, 3), faces (F, 3)."""
+    """A linear RGBA (4,) chosen by a hash of the surface: vertices (N, 3), faces (F, 3)."""
     digest = hashlib.sha256(np.ascontiguousarray(vertices, dtype="<f4").tobytes())
     digest.update(np.ascontiguousarray(faces, dtype="<i4").tobytes())
     srgb = PALETTE[digest.digest()[0] % len(PALETTE)]

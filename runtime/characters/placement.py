@@ -1,4 +1,4 @@
-"""Where a character stands: from its file's unit and axes to the stage."""
+"""Place a character on the stage: from its file's unit and axes to metres, +Y up, facing +Z."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from solvers.surface.upright import (
 FloatArray = NDArray[np.float64]
 
 HEIGHT = 1.7
-"""[m] of what stands upright on the stage."""
+"""Greatest height [m] of a character on the stage."""
 
 WIDTH = 2.2
-"""[m] that a character may be wide or deep."""
+"""Greatest width and depth [m]."""
 
 UPRIGHT = np.eye(3)
 Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
@@ -28,19 +28,19 @@ Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
 
 ABOUT_FACE = np.diag([-1.0, 1.0, -1.0])
 SIDE_TO_FRONT = np.array([[0.0, 0.0, -1.0], [0.0, 1.0, 0.0], [1.0, 0.0, 0.0]])
-"""Takes what faces +X to face +Z."""
+"""Takes +X to +Z."""
 
 
 def guess_rotation(
     vertices: FloatArray, faces: NDArray[np.int64]
 ) -> tuple[FloatArray, tuple[str, ...]]:
-    """The rotation (3, 3) that makes a surface stand upright and face +Z, and notes of guesses.
+    """Guess the rotation (3, 3) that makes a surface stand upright and face +Z; also return notes.
 
-    A sheet is turned so that the stage sees its face. A creature that looks along x is left: its
-    side shows most of it.
+    A flat sheet is turned so that its face looks forward. A creature that looks along x is left as
+    it is: its side shows most of it.
 
     Args:
-        vertices: (N, 3) in a file's axes, which it does not name.
+        vertices: (N, 3) in the axes of a file that does not name them.
         faces: (F, 3) into `vertices`.
     """
     points = surface_samples(vertices, faces)
@@ -58,10 +58,10 @@ def guess_rotation(
 
 
 def placement_matrix(rotation: FloatArray, points: FloatArray) -> FloatArray:
-    """The matrix (4, 4) that turns, scales and puts points (n, 3) down in the middle of the stage.
+    """The matrix (4, 4) that turns, scales and moves points (n, 3) to the middle of the stage.
 
-    The scale is uniform and the largest that keeps within `HEIGHT` and, to the sides and the back,
-    `WIDTH`; the lowest point is at y = 0.
+    The scale is uniform: the largest that keeps the height within `HEIGHT` and width and depth
+    within `WIDTH`. The lowest point is at y = 0.
 
     Args:
         rotation: (3, 3) from the file's axes to the stage's.
@@ -79,6 +79,6 @@ def placement_matrix(rotation: FloatArray, points: FloatArray) -> FloatArray:
 
 
 def placed(matrix: FloatArray, points: FloatArray) -> FloatArray:
-    """Points (n, 3) taken through a placement (4, 4)."""
+    """Points (n, 3) moved by a placement (4, 4)."""
     moved: FloatArray = points @ matrix[:3, :3].T + matrix[:3, 3]
     return moved

@@ -1,4 +1,4 @@
-"""What is deformed in a character's place: its own surface, or a coarse one that it follows."""
+"""The surface that is deformed: a character's own, or a coarse one that its vertices follow."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from runtime.characters.character import Character
 from solvers.surface.decimation import decimate
 from solvers.surface.embedding import MOST_VERTICES, DenseSurface, embed
 
-DENSE = 20_000  # vertices above which a proxy pays: docs/dense-characters.md, `bunraku bench dense`
-PROXY = 9_000  # vertices of one
-_WORTH = 0.7  # share of the vertices that a proxy may keep and still be worth it
+DENSE = 20_000  # vertices; above this a proxy is faster (docs/dense-characters.md, `bench dense`)
+PROXY = 9_000  # vertices of a proxy
+_WORTH = 0.7  # a proxy that keeps a larger share of the vertices is not used
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -24,11 +24,11 @@ class Proxy:
     """A surface to bind a skeleton to and to deform, which the character's surface follows.
 
     Attributes:
-        vertices: (C, 3) [m] at rest, some of the character's, or all of them.
-        faces: (F', 3).
-        kept: (C,) which of the character's vertices they are.
-        surface: what lets the others follow; None where there are no others.
-        notes: why a dense character is deformed in full, if it is, one short line each.
+        vertices: (C, 3) [m] at rest: some of the character's vertices, or all.
+        faces: (F', 3) into `vertices`.
+        kept: (C,) index of each in the character's vertices.
+        surface: moves the other vertices along; None where the proxy has all of them.
+        notes: one short line if a dense character has no proxy, and why.
     """
 
     vertices: Array
@@ -39,9 +39,9 @@ class Proxy:
     _out: Array | None = None
 
     def follow(self, moved: Array) -> Array:
-        """Give the character's vertices (N, 3) [m] that go with the proxy's, `moved` (C, 3) [m].
+        """Return the character's vertices (N, 3) [m] for deformed ones of the proxy (C, 3) [m].
 
-        They are overwritten by the next call; nothing is allocated.
+        The next call overwrites the result; nothing is allocated.
         """
         if self.surface is None or self._out is None:
             return moved
@@ -50,12 +50,12 @@ class Proxy:
 
 
 def proxy_of(character: Character, *, dense: int = DENSE, count: int = PROXY) -> Proxy:
-    """Choose what is deformed: the character itself, or a proxy if it has over `dense` vertices.
+    """Return a proxy of a character; below `dense` vertices it is the character's whole surface.
 
     Args:
-        character: whose surface.
-        dense: vertices above which there is a proxy.
-        count: vertices of one.
+        character: the character to deform.
+        dense: number of vertices above which the surface is simplified.
+        count: number of vertices to simplify it to.
     """
     if len(character.vertices) <= dense:
         return _whole(character)
@@ -70,11 +70,13 @@ def proxy_of(character: Character, *, dense: int = DENSE, count: int = PROXY) ->
 
 
 def _whole(character: Character, *notes: str) -> Proxy:
+    """A proxy with all of the character's vertices."""
     everything = np.arange(len(character.vertices))
     return Proxy(character.vertices, character.faces, everything, notes=notes)
 
 
 def _too_torn(character: Character, kept: int) -> str:
+    """The note on a surface that falls into too many pieces to simplify."""
     return (
         f"{len(character.vertices)} vertices in pieces too small to simplify ({kept} at the least):"
         " deformed in full, which may be slow"

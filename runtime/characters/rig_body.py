@@ -1,4 +1,4 @@
-"""A body for a rig that comes without one: a lay figure of turned wood around its bones."""
+"""Make a body for a rig without a mesh: a wooden figure around its bones."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ Faces = NDArray[np.int64]
 Bones = NDArray[np.int64]
 
 _SIZE = 1.7
-"""The rig is scaled to this extent [m] to be modelled: the signed distances are made for metres."""
+"""The rig is scaled to this extent [m] for modelling; the signed distances expect metres."""
 _PROFILE = (0.7, 1.0, 0.92, 0.62)
-"""A turned limb: its radius from joint to joint."""
+"""Radius of a limb from joint to joint, over the bone's radius."""
 _MOST_SAMPLES = 2_000_000
-"""The signed distance is asked for at about as many points."""
-_FEWEST, _WANTED, _MOST = 3_000, 5_000, 8_000
+"""About as many points are sampled from the signed distance."""
+_FEWEST, _WANTED, _MOST = 3_000, 5_000, 8_000  # vertices
 
 
 def body_around(skeleton: Skeleton) -> tuple[Array, Faces, csr_array]:
-    """A watertight body round the bones of a skeleton, which may be in any unit.
+    """Make a watertight body around the bones of a skeleton in any unit.
 
     Returns:
         vertices (n, 3) in the skeleton's unit, about 3000 to 8000; faces (m, 3); weights (n, J):
@@ -62,10 +62,10 @@ def body_around(skeleton: Skeleton) -> tuple[Array, Faces, csr_array]:
 
 
 def bone_radii(positions: Array, bones: Bones) -> Array:
-    """The radius (b,) of each bone, from how much hangs on it.
+    """The radius (b,) of each bone, from the length of all bones that it carries.
 
-    Limbs thin out as branches do: the section of each is in proportion to the length of all that
-    it carries (L. da Vinci's rule of trees). Limbs that lie side by side leave room between them.
+    Limbs thin out like branches: the cross-section of each is proportional to the length of all
+    bones that it carries (L. da Vinci's rule of trees). Limbs side by side leave room between them.
     """
     length = np.linalg.norm(positions[bones[:, 1]] - positions[bones[:, 0]], axis=1)
     into = {int(joint): number for number, joint in enumerate(bones[:, 1])}
@@ -75,7 +75,7 @@ def bone_radii(positions: Array, bones: Bones) -> Array:
         if above is not None:
             carried[above] += carried[number]
     radii = 0.08 * _SIZE * np.sqrt(carried / length.sum())
-    # A head, the end of a bone on the middle plane, is an egg rather than a twig.
+    # A head, the end of a bone on the middle plane, is twice as thick.
     ends = ~np.isin(bones[:, 1], bones[:, 0])
     middle = np.abs(positions[bones] - np.median(positions, axis=0))[..., 0].max(axis=1)
     radii[ends & (middle < 0.02 * _SIZE)] *= 2.0
@@ -84,7 +84,7 @@ def bone_radii(positions: Array, bones: Bones) -> Array:
 
 
 def _room(positions: Array, bones: Bones) -> Array:
-    """How far (b,) each bone is from those near it in space that are far along the skeleton."""
+    """The distance (b,) from each bone to those near in space and far along the skeleton."""
     start, end = positions[bones[:, 0]], positions[bones[:, 1]]
     count = len(positions)
     length = np.maximum(np.linalg.norm(end - start, axis=1), 1e-9)
@@ -145,7 +145,7 @@ def _marks(start: Array, end: Array, spacing: float) -> Array:
 
 
 def _meshed(positions: Array, bones: Bones, radii: Array) -> tuple[Array, Faces]:
-    """The body's mesh, its edges chosen so that it has about as many vertices as are wanted."""
+    """The body's mesh, with an edge length that gives about `_WANTED` vertices."""
     length = np.linalg.norm(positions[bones[:, 1]] - positions[bones[:, 0]], axis=1)
     area = float(np.sum(2.0 * np.pi * radii * length))
     edge = 2.0 * np.sqrt(area / (0.87 * _WANTED))
@@ -163,7 +163,7 @@ def _meshed(positions: Array, bones: Bones, radii: Array) -> tuple[Array, Faces]
 def _level_set(
     positions: Array, bones: Bones, radii: Array, edge: float
 ) -> tuple[Array, Faces, Field]:
-    thick = np.maximum(radii, 0.8 * edge)  # what is thinner than an edge would fall to pieces
+    thick = np.maximum(radii, 0.8 * edge)  # limbs thinner than an edge would fall to pieces
     air = 2.0 * edge
     solid = _solid(positions, bones, thick, air)
     lower, upper = positions.min(axis=0), positions.max(axis=0)

@@ -1,9 +1,9 @@
-"""Which side a character shows to the house.
+"""Turn a long character, such as a camel, so that the camera sees its side.
 
-A camel seen from the front hides most of itself, and matching on the screen has little to go by. Of
-the side and the front the better view is the one that shows more of the bones' lengths (proposed as
-a preferable viewpoint in AniMesh, section 8); a character that is much longer than wide, and shows
-more from the side, is turned to its left.
+From the front a camel hides most of itself, and matching on the screen has few bones to compare.
+The better view is the one in which the bones are longer (AniMesh, section 8, "preferable
+viewpoint"). A character that is much longer than wide, with longer bones from the side, is turned
+by a quarter to its left.
 """
 
 from __future__ import annotations
@@ -15,14 +15,14 @@ import numpy as np
 from devices.skeleton import Skeleton
 from runtime.characters.character import Character
 
-LONG = 2.0  # times as long as wide
-MORE = 1.2  # times the length of bones seen from the front
+LONG = 2.0  # least ratio of length to width
+MORE = 1.2  # least ratio of the bones' lengths from the side to those from the front
 
 _TO_THE_LEFT = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
 
-def seen_from_best_side(character: Character) -> Character:
-    """The character, turned by a quarter where its side shows much more than its front."""
+def turned_to_best_side(character: Character) -> Character:
+    """Return the character, turned by a quarter if it is long and its side shows more bones."""
     width, _, length = np.ptp(character.vertices, axis=0)
     if length < LONG * width or _bones_seen(character, 2) < MORE * _bones_seen(character, 0):
         return character
@@ -41,7 +41,7 @@ def seen_from_best_side(character: Character) -> Character:
 
 
 def _bones_seen(character: Character, across: int) -> float:
-    """Sum of the bones' lengths [m] in a picture of the plane of y and the axis `across`."""
+    """The sum of the bones' lengths [m], projected on the plane of y and the axis `across`."""
     parents = character.skeleton.parents
     child = np.flatnonzero(parents >= 0)
     positions = character.skeleton.rest_positions

@@ -1,4 +1,4 @@
-"""Welding: vertices that a file splits at its seams, made one again so that they move as one."""
+"""Weld vertices that a file splits at seams, so that each point of the surface moves as one."""
 
 from __future__ import annotations
 
@@ -9,17 +9,17 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 TOLERANCE = 1e-7
-"""Of the diagonal of the bounding box: the rounding of float32 coordinates, and no feature."""
+"""Share of the bounding box's diagonal: above float32 rounding, below any feature."""
 
-_NEIGHBOURS = 8  # looked at around a vertex, so that a heap of vertices in one spot stays cheap
+_NEIGHBOURS = 8  # searched around each vertex; bounds the cost of many vertices in one spot
 
 
 def weld(vertices: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Which welded vertex (M,) each file vertex is, counted in the order they first appear.
+    """The welded vertex (M,) of each file vertex, numbered by first appearance.
 
     Args:
-        vertices: (M, 3) finite, any unit; equal ones, and those closer than `TOLERANCE` of the
-            size, become one.
+        vertices: (M, 3) finite, any unit; those closer than `TOLERANCE` times the size become
+            one.
     """
     positions, distinct = np.unique(vertices + 0.0, axis=0, return_inverse=True)  # -0 is 0
     reach = TOLERANCE * float(np.linalg.norm(np.ptp(vertices, axis=0)))
@@ -32,12 +32,12 @@ def weld(vertices: NDArray[np.float64]) -> NDArray[np.int64]:
 
 
 def first_occurrences(groups: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The file vertex (N,) that each welded vertex of `weld` is first met as."""
+    """The first file vertex (N,) of each welded vertex."""
     return np.asarray(np.unique(groups, return_index=True)[1], dtype=np.int64)
 
 
 def welded_weights(weights: csr_array, groups: NDArray[np.int64]) -> csr_array:
-    """The weights (N, K) of welded vertices: the mean of what (M, K) says of those made one."""
+    """The weights (N, K) of welded vertices: the mean of those (M, K) of their file vertices."""
     count = np.bincount(groups)
     mean = csr_array(
         (1.0 / count[groups], (groups, np.arange(len(groups)))), shape=(len(count), len(groups))

@@ -94,7 +94,7 @@ class OpenedShow:
         self._conditioning = asked_for(usual, settings.conditioning)
         first = self._performer()
         self.report = Report(settings.files.report)
-        self._parts = [self.report.cast(character) for character in characters]
+        self._parts = [self.report.add_character(character) for character in characters]
         own = settings.characters
         own = own if len(own) == len(characters) else own * len(characters)
         self.puppets = list(map(self._puppet, characters, own))

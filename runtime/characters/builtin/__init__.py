@@ -1,7 +1,7 @@
-"""The characters that ship with Bunraku: sculpted in code, meshed beforehand, read at once.
+"""The built-in characters: modelled in code, meshed beforehand, loaded from ``meshes/*.npz``.
 
-Each is a module with `sculpt()`; ``python -m runtime.characters.builtin.build`` meshes them into
-``meshes/*.npz``, which is all that `builtin_character` needs at run time.
+Each is a module with `sculpt()`; ``python -m runtime.characters.builtin.build`` meshes them.
+`builtin_character` reads only the stored meshes.
 """
 
 from runtime.characters.builtin.catalogue import BUILTIN, builtin_character

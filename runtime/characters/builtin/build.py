@@ -27,7 +27,7 @@ SCULPTORS: dict[str, Callable[[], Sculpture]] = {
 
 
 def built(sculpture: Sculpture) -> dict[str, NDArray[np.generic]]:
-    """What is stored of a character: its mesh put on the ground, colours (n, 3) and skeleton."""
+    """The stored arrays of a character: its mesh on the ground, colours (n, 3) and skeleton."""
     vertices, faces = meshed(sculpture)
     colors = painted(sculpture, vertices, crispness=0.03 * sculpture.edge)
     skeleton = grow(sculpture.limbs)

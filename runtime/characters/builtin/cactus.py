@@ -1,4 +1,4 @@
-"""The cactus: a saguaro in a flower pot, pleased to be here."""
+"""The built-in cactus: a saguaro in a flower pot."""
 
 from __future__ import annotations
 

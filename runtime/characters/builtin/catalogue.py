@@ -1,4 +1,4 @@
-"""The built-in characters by name."""
+"""Load built-in characters by name."""
 
 from __future__ import annotations
 
@@ -16,10 +16,10 @@ BUILTIN = ("squid", "cactus", "trex", "paper", "mannequin")
 
 
 def builtin_character(name: str) -> Character:
-    """The built-in character called `name`, in its rest pose on the stage.
+    """Return the built-in character called `name`, in its rest pose on the stage.
 
     Raises:
-        InputError: there is none of that name; the message lists those there are.
+        InputError: the name is not known; the message lists the known names.
     """
     if name not in BUILTIN:
         raise InputError(

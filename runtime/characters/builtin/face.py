@@ -1,4 +1,4 @@
-"""The faces of the built-in characters: one family likeness, seen from the front."""
+"""Paint the faces of the built-in characters: eyes, pupils and a smile, seen from the front."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from runtime.characters.builtin.signed_distance import (
 
 @dataclass(frozen=True, slots=True)
 class Face:
-    """Where a face sits and how large it is; lengths in metres, as seen from the front.
+    """The position and size of a face, seen from the front [m].
 
     Attributes:
         y: height of the eyes' centres.

@@ -1,4 +1,4 @@
-"""The mannequin: the artist's wooden dummy, standing with its arms a little away."""
+"""The built-in mannequin: an artist's wooden figure with its arms away from the body."""
 
 from __future__ import annotations
 

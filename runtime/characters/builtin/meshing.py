@@ -1,4 +1,4 @@
-"""From a signed distance to a watertight mesh of even triangles that follow painted outlines."""
+"""Mesh a signed distance: watertight, with even triangles whose edges follow painted outlines."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The sheet of paper: a page from an exercise book that somebody has drawn a face on."""
+"""The built-in sheet of paper: a page from an exercise book with a face drawn on it."""
 
 from __future__ import annotations
 

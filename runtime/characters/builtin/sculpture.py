@@ -1,4 +1,4 @@
-"""What one built-in character is made of, before it is meshed: a solid, its paint, its limbs."""
+"""The parts of a built-in character before it is meshed: a solid, paints and limbs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A small vocabulary of signed distances to model characters with; negative inside, metres.
+"""Signed distances to model characters with: negative inside, in metres.
 
 Source: J. C. Hart, "Sphere tracing", The Visual Computer 1996 (distance bounds and their blends);
 I. Quilez, "Distance functions" (the ellipsoid's bound and the polynomial smooth minimum).

@@ -1,4 +1,4 @@
-"""The squid: a plush one that floats, with eight tentacles fanned out towards the audience."""
+"""The built-in squid: a floating plush squid with eight tentacles spread towards the camera."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from runtime.characters.builtin.signed_distance import (
 )
 
 # One side's tentacles, from the topmost down: where each passes, x outwards. The fan is spread in
-# the plane that faces the audience, so that the tentacles differ in screen space.
+# the plane that faces the camera, so that the tentacles differ in screen space.
 _SIDE = (
     [
         (0.13, 0.66, 0.03),

@@ -1,4 +1,4 @@
-"""The T-Rex: all head and tail, with very small arms that it is very proud of."""
+"""The built-in T-Rex: a large head and tail, and very small arms."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""MEDIT .mesh files in ASCII: the surface of a triangle or tetrahedral mesh."""
+"""Read MEDIT .mesh files in ASCII: the surface of a triangle or tetrahedral mesh."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ _CORNERS = {"triangles": 3, "quadrilaterals": 4, "tetrahedra": 4}
 def read_medit(content: bytes) -> FileMesh:
     """Read the vertices and the triangles and quadrilaterals of a MEDIT file.
 
-    Where it has tetrahedra only, their boundary is the surface. Vertices of the inside stay, so
-    that file order is kept.
+    The surface of a file with tetrahedra only is their boundary; inner vertices stay, which keeps
+    the file's order.
 
     Raises:
-        MeshError: what is wrong with it.
+        MeshError: a list is damaged, or there are no faces, or too many.
     """
     lines = (line.split("#", 1)[0] for line in content.decode("latin-1").splitlines())
     words = " ".join(lines).split()
@@ -50,7 +50,7 @@ def _block(words: list[str], keyword: str, width: int) -> NDArray[np.float64]:
 
 
 def _boundary(tetrahedra: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The triangles of only one tetrahedron, facing outwards as its corners are ordered."""
+    """The triangles that belong to one tetrahedron only, facing outwards."""
     triangles = tetrahedra[:, [[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]]].reshape(-1, 3)
     _, first, count = np.unique(
         np.sort(triangles, axis=1), axis=0, return_index=True, return_counts=True

@@ -1,4 +1,4 @@
-"""What a mesh file holds, before it is welded and placed."""
+"""The content of a mesh file before it is welded and placed, and its limits."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def plain_material() -> Material:
 
 
 class MeshError(ValueError):
-    """What is wrong in the content of a mesh file; the reader of files adds which file."""
+    """A fault in the content of a mesh file; `read_mesh_file` adds the file's name."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -33,7 +33,7 @@ class FileMesh:
         uvs: (M, 2) as glTF has them, v downwards, or None.
         materials: at least one.
         face_material: (F,) into `materials`, or None: all of them are the first.
-        notes: what was left out or mended, one short line each.
+        notes: omissions and repairs, one short line each.
     """
 
     vertices: NDArray[np.float64]
@@ -46,7 +46,7 @@ class FileMesh:
 
 
 def check_counts(vertices: int, faces: int) -> None:
-    """Refuse counts that no file may declare.
+    """Refuse counts of vertices and faces that are zero or too large.
 
     Raises:
         MeshError: there is nothing, or too much.

@@ -1,4 +1,4 @@
-"""Mesh files of every format, checked: vertices in file order, triangles, colours."""
+"""Read and check mesh files of every format."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off", ".mesh")
 MOST_BYTES = 1 << 30
 
 
-@np.errstate(over="ignore", invalid="ignore")  # whatever a damaged file holds
+@np.errstate(over="ignore", invalid="ignore")  # numbers of a damaged file
 def read_mesh_file(path: Path) -> FileMesh:
     """Read a file of `MESH_SUFFIXES`; all its objects are one mesh.
 
@@ -70,10 +70,10 @@ def _read(path: Path, content: bytes) -> FileMesh:
 
 
 def checked(mesh: FileMesh) -> FileMesh:
-    """The mesh with unknown colours replaced.
+    """Check a mesh, and replace colours that are not numbers.
 
     Raises:
-        MeshError: it has no faces, too many, none with an extent, or names what is not there.
+        MeshError: it has no faces, too many or none with an extent, or names a missing vertex.
     """
     check_counts(len(mesh.vertices), len(mesh.faces))
     check_indices(mesh.faces, len(mesh.vertices))

@@ -1,4 +1,4 @@
-"""Material libraries of OBJ files: diffuse colour, opacity and diffuse texture."""
+"""Read material libraries of OBJ files: diffuse colour, opacity and diffuse texture."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ MOST_BYTES = 4 << 20
 MOST_TEXTURE_BYTES = 256 << 20
 MOST_TEXELS = 8192 * 8192
 TEXTURE_SIZE = 2048
-"""Larger textures are reduced to this many texels on the longer side."""
+"""Greatest number of texels on the longer side; larger textures are reduced."""
 
 
 def read_mtl(path: Path) -> tuple[dict[str, Material], list[str]]:
-    """The materials by name, and notes; a missing or damaged library gives none, never an error.
+    """Return the materials by name, and notes; a missing or damaged library gives none.
 
     `Kd` is taken as sRGB and replaced by white under a `map_Kd`, which most exporters mean. A name
-    is all that stands behind `newmtl`, `#` included.
+    is the whole line behind `newmtl`, with `#`.
     """
     try:
         if not path.is_file():

@@ -1,4 +1,4 @@
-"""Wavefront OBJ files: all objects and groups, with the diffuse colours of their materials."""
+"""Read Wavefront OBJ files: all objects and groups, with their materials' diffuse colours."""
 
 from __future__ import annotations
 
@@ -87,7 +87,7 @@ def _uncommented(name: str) -> str:
 def _split(
     corners: NDArray[np.int64], count: int, uvs: NDArray[np.float64]
 ) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float32]]:
-    """Vertices with one uv each: what they copy (M,), faces (F, 3), uvs (M, 2), v downwards."""
+    """Split vertices at uv seams: sources (M,), faces (F, 3) and uvs (M, 2), v downwards."""
     pairs, first, inverse = np.unique(
         corners.reshape(-1, 2), axis=0, return_index=True, return_inverse=True
     )

@@ -1,4 +1,9 @@
-"""The lines of Wavefront OBJ files as arrays, read in blocks of some megabytes."""
+"""Parse the lines of Wavefront OBJ files into arrays, in bulk.
+
+trimesh's parser is not used: it resolves relative indices against the end of the file, reorders
+faces by material, misses comments behind faces and leading blanks, and opens the material library.
+This one is as fast and reads each line by the format's rules.
+"""
 
 from __future__ import annotations
 
@@ -11,9 +16,7 @@ from numpy.typing import NDArray
 
 from runtime.characters.formats.mesh_data import MOST_FACES, MOST_VERTICES, MeshError
 
-_BLOCK = (
-    4 << 20
-)  # [bytes] read at a time, so that the words of a large file never all exist at once
+_BLOCK = 4 << 20  # [bytes] parsed at a time; bounds the memory for words
 _MOST_LINE = 16 << 20  # [bytes]
 _KINDS = {"v": 1, "vt": 2, "f": 3, "usemtl": 4, "mtllib": 5}
 _V, _VT, _F, _USEMTL, _MTLLIB = _KINDS.values()

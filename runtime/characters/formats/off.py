@@ -1,4 +1,4 @@
-"""OFF files in ASCII, with colours of the vertices."""
+"""Read OFF files in ASCII, with colours of vertices."""
 
 from __future__ import annotations
 
@@ -15,14 +15,13 @@ _KEYWORD = re.compile(r"(ST)?(C)?(N)?(4)?(n)?OFF\b", re.ASCII)
 
 
 def read_off(content: bytes) -> FileMesh:
-    """Read OFF, COFF, NOFF, CNOFF and STOFF; polygons are cut into triangles, comments
-    skipped.
+    """Read OFF, COFF, NOFF, CNOFF and STOFF; polygons are cut into triangles.
 
     Colours of vertices are taken as sRGB, whole numbers to 255 or fractions to 1; colours of faces,
     normals and texture coordinates are left out.
 
     Raises:
-        MeshError: what is wrong with it, and in which line of those that are not comments.
+        MeshError: the file is damaged, cut short or binary.
     """
     lines = [
         line.split()
@@ -51,7 +50,7 @@ def read_off(content: bytes) -> FileMesh:
 
 
 def _header(lines: list[list[str]]) -> tuple[bool, bool, int]:
-    """Whether vertices have colours, whether normals, and in which line the counts are."""
+    """Whether vertices have colours, whether they have normals, and the line of the counts."""
     found = _KEYWORD.fullmatch(lines[0][0])
     if found is None:
         raise MeshError(f"it does not begin with OFF but with {lines[0][0][:20]!r}")

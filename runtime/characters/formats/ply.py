@@ -1,4 +1,4 @@
-"""PLY files, ASCII and binary, parsed by trimesh."""
+"""Read PLY files, ASCII and binary, with trimesh's parser."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""STL files, binary and ASCII."""
+"""Read STL files, binary and ASCII."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def read_stl(content: bytes) -> FileMesh:
     """Read every solid of an STL file; equal corners become one vertex, in order of appearance.
 
     Raises:
-        MeshError: what is wrong with it.
+        MeshError: the file is damaged or cut short, or has too many triangles.
     """
     corners = _binary(content) if _looks_binary(content) else _ascii(content)
     positions, first, inverse = np.unique(
@@ -29,7 +29,7 @@ def read_stl(content: bytes) -> FileMesh:
 
 
 def _looks_binary(content: bytes) -> bool:
-    """Binary files may begin with "solid" too: the size, then the text, decides."""
+    """Decide by the size, then by the text: binary files may begin with "solid" too."""
     if len(content) >= 84 and len(content) == 84 + 50 * int.from_bytes(content[80:84], "little"):
         return True
     return not (content.lstrip()[:5].lower() == b"solid" and b"\0" not in content[:1024])

@@ -1,4 +1,4 @@
-"""The JSON of a glTF file, where nothing is believed before it is checked."""
+"""Read the JSON of a glTF file with every type and range checked."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ MOST_ENTRIES = 1_000_000
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One object of the document, and where it stands, for messages.
+    """One JSON object of the document, and its place in it for messages.
 
-    Every getter raises MeshError when the property is there with another type or range, or when
-    it is missing and no default is given.
+    Every getter raises MeshError when the property has another type or range, or when it is
+    missing and there is no default.
     """
 
     fields: dict[str, Any]
@@ -30,7 +30,7 @@ class Entry:
         return name in self.fields
 
     def wrong(self, what: str) -> MeshError:
-        """The error that says what is wrong with this entry."""
+        """Make the error that names this entry and its fault."""
         return MeshError(f"{self.place}: {what}; export the model again")
 
     def whole(self, name: str, default: int | None = None, *, below: int = 1 << 40) -> int:
@@ -84,7 +84,7 @@ class Entry:
         return None if value is None else Entry(value, f"{self.place}, {name}")
 
     def extension(self, name: str) -> Entry | None:
-        """What the extension called `name` adds to this entry, or None."""
+        """The object of the extension called `name`, or None."""
         extensions = self.child("extensions")
         return None if extensions is None else extensions.child(name)
 
@@ -111,7 +111,7 @@ def _is_moderate(value: object) -> bool:
 
 
 def parse_document(content: bytes) -> Entry:
-    """The document in UTF-8 JSON `content`.
+    """Parse a document in UTF-8 JSON.
 
     Raises:
         MeshError: it is not JSON, not an object, or not glTF 2.

@@ -1,4 +1,4 @@
-"""The bytes of a glTF file: containers, buffers, accessors. Every offset and count is checked.
+"""Read containers, buffers and accessors of glTF files; every offset and count is checked.
 
 Source: Khronos, "glTF 2.0 Specification", sections 3.6 (binary data) and 4 (GLB); extensions
 KHR_mesh_quantization and (refused) KHR_draco_mesh_compression, EXT_meshopt_compression.
@@ -31,7 +31,7 @@ _COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 51
 
 
 class GltfFile:
-    """An open glTF, GLB or VRM file; buffers are read when they are first asked for."""
+    """An open glTF, GLB or VRM file; buffers are read at their first use."""
 
     def __init__(self, path: Path) -> None:
         """Read `path`.
@@ -60,7 +60,7 @@ class GltfFile:
         """The entry of a kind with an index.
 
         Raises:
-            MeshError: there is none.
+            MeshError: it does not exist.
         """
         entries = self.entries(kind)
         if index >= len(entries):
@@ -68,10 +68,10 @@ class GltfFile:
         return entries[index]
 
     def uri_content(self, uri: str) -> bytes:
-        """What a data URI holds, or the file beside this one that a relative URI names.
+        """The bytes of a data URI, or of the file that a relative URI names, in this file's folder.
 
         Raises:
-            MeshError: the URI leads elsewhere, is damaged, or the file cannot be read.
+            MeshError: the URI leaves the folder, is damaged, or the file cannot be read.
         """
         if uri.startswith("data:"):
             head, _, body = uri.partition(",")
@@ -130,7 +130,7 @@ class GltfFile:
             self._buffers[index] = content
         return self._buffers[index]
 
-    @np.errstate(invalid="ignore")  # whatever a damaged file holds
+    @np.errstate(invalid="ignore")  # numbers of a damaged file
     def floats(self, index: int, *kinds: str) -> NDArray[np.float64]:
         """An accessor's elements (n, width); normalised integers become [0, 1] or [-1, 1]."""
         accessor = self.entry("accessors", index)
@@ -149,7 +149,7 @@ class GltfFile:
         return values.astype(np.int64)
 
     def count(self, index: int) -> int:
-        """How many elements an accessor has, before any is read."""
+        """The number of elements of an accessor, without reading them."""
         return self.entry("accessors", index).whole("count", below=_MOST_ELEMENTS + 1)
 
     def _elements(self, accessor: Entry, kinds: tuple[str, ...]) -> NDArray[np.generic]:

@@ -1,4 +1,4 @@
-"""From the joints of a glTF file's skins to one skeleton of those that move something."""
+"""Build one skeleton from the joints of all skins of a glTF file, without idle joints."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ _STEM = 0.05
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rig:
-    """A skeleton, and which of its joints each node of the scene moves with.
+    """A skeleton, and the joint that each node of the scene moves with.
 
     Attributes:
         skeleton: in scene coordinates.
-        joint_of: (n,) the joint that each of the scene's n nodes became; -1 for the others.
+        joint_of: (n,) joint of each of the scene's n nodes; -1 for nodes that are no joints.
     """
 
     skeleton: Skeleton
@@ -32,7 +32,7 @@ class Rig:
 
 
 def with_connections(scene: Scene, joints: Iterable[int]) -> set[int]:
-    """The joints and the nodes between each of them and those above it."""
+    """The joints, and all nodes between them."""
     named = set(joints)
     result = set(named)
     for joint in named:
@@ -45,18 +45,18 @@ def with_connections(scene: Scene, joints: Iterable[int]) -> set[int]:
 def build_rig(
     scene: Scene, joints: set[int], weight: Array, names: list[str], *, moving: bool
 ) -> Rig:
-    """One skeleton of `joints`, closed under `with_connections`.
+    """Build one skeleton of `joints`, which are closed under `with_connections`.
 
-    Joints at the place of their parent become one with it; those that move nothing are left out,
-    but for one that ends a bone; several roots hang on the node above them all, or, where that only
-    places the rig in the scene, on the nearest joint of the largest tree.
+    A joint at the position of its parent is merged with it. Joints that move nothing are left out,
+    except the end of each bone. Several roots become children of the node above them all; if that
+    node only places the rig in the scene, of the nearest joint of the largest tree.
 
     Args:
         scene: the node tree.
         joints: node indices.
-        weight: (n,) how much of the surface each node moves.
+        weight: (n,) sum of the skin weights of each node.
         names: n node names.
-        moving: whether there is a surface at all, so that a joint without weight moves nothing.
+        moving: whether there is a surface; without one every joint is kept.
     """
     positions = scene.positions
     reach = float(np.linalg.norm(np.ptp(positions[sorted(joints)], axis=0)))
@@ -84,13 +84,13 @@ def _above_all(scene: Scene, nodes: list[int]) -> int | None:
 
 
 class _Tree:
-    """Joints being pruned.
+    """Joints while they are pruned.
 
     Attributes:
         parent: each joint's parent joint, -1 for roots; parents come before their children.
         names: of all nodes.
-        became: the joint that each joint merged away moves with.
-        weight: how much each node moves.
+        became: the joint that each merged joint moves with.
+        weight: sum of the skin weights of each node.
     """
 
     def __init__(self, parent: dict[int, int], weight: Array, names: list[str]) -> None:
@@ -115,7 +115,7 @@ class _Tree:
         return below
 
     def merge_coincident(self, positions: Array, reach: float) -> None:
-        """Make each joint at the place of its parent one with it, under the busier one's name."""
+        """Merge each joint at its parent's position; the name of the one with more weight stays."""
         for joint in list(self.parent):
             parent = self.became.get(self.parent[joint], self.parent[joint])
             self.parent[joint] = parent
@@ -128,7 +128,7 @@ class _Tree:
             del self.parent[joint]
 
     def drop_idle(self, positions: Array) -> None:
-        """Drop what moves nothing, below it neither, but for the farthest end of each bone."""
+        """Drop joints without weight, also below them, except the farthest end of each bone."""
         below = self.children()
         busy: dict[int, bool] = {}
         for joint in reversed(list(self.parent)):
@@ -145,14 +145,14 @@ class _Tree:
         return [joint for joint, parent in self.parent.items() if parent < 0]
 
     def places(self, joint: int, positions: Array, reach: float) -> bool:
-        """Whether a joint only places the rig in the scene: it stands on its origin, idle."""
+        """Whether a joint only places the rig in the scene: at the origin, without weight."""
         return self.weight[joint] == 0.0 and float(np.linalg.norm(positions[joint])) <= reach
 
     def drop_stem(self, positions: Array, reach: float, *, moving: bool) -> None:
         """Drop roots that are no part of the body.
 
-        Those with one child, if they move nothing; with several, if they only place the rig. Where
-        nothing is known to move, those with one child that only place the rig.
+        A root with one child goes if it moves nothing, one with several if it only places the rig.
+        Without a surface, a root with one child goes if it only places the rig.
         """
         below = self.children()
         waiting = self.roots()
@@ -167,7 +167,7 @@ class _Tree:
                 waiting.extend(below[joint])
 
     def graft(self, positions: Array) -> None:
-        """Hang the smaller trees on the nearest joint of the largest, as feet that stand on IK."""
+        """Attach smaller trees, such as feet below an IK root, to the largest tree."""
         below = self.children()
         trees = {root: [root] for root in self.roots()}
         for joints in trees.values():
@@ -180,11 +180,11 @@ class _Tree:
             self.parent[root] = int(stock[np.argmin(gap)])
 
     def join(self, roots: list[int], above: int) -> None:
-        """Hang the roots on a new root."""
+        """Make all roots children of a new root."""
         self.parent = {above: -1} | self.parent | dict.fromkeys(roots, above)
 
     def rig(self, positions: Array, nodes: int) -> Rig:
-        """The skeleton of the joints that are left, and the joint of each of the scene's nodes."""
+        """The skeleton of the remaining joints, and the joint of each node of the scene."""
         joints = list(self.parent)
         place = {joint: number for number, joint in enumerate(joints)}
         joint_of = np.full(nodes, -1, dtype=np.int64)
@@ -199,7 +199,7 @@ class _Tree:
 
 
 def unique_names(names: list[str]) -> tuple[str, ...]:
-    """The names, those that occurred before with a number behind them."""
+    """The names, with a number appended to repeated ones."""
     taken = set(names)
     seen: set[str] = set()
     result: list[str] = []

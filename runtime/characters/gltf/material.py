@@ -1,4 +1,4 @@
-"""What the surfaces of a glTF file look like: base colours and their textures."""
+"""Read the materials of a glTF file: base colours and their textures."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class MaterialReader:
         self.notes: list[str] = []
 
     def slot(self, index: int | None) -> int:
-        """Where in `materials` the file's material `index` is; None is glTF's default one."""
+        """The place in `materials` of the file's material `index`; None is glTF's default."""
         if index not in self._slots:
             self._slots[index] = len(self.materials)
             self.materials.append(plain_material() if index is None else self._read(index))
@@ -87,7 +87,7 @@ class MaterialReader:
 
 
 def base(material: Entry) -> tuple[Entry | None, str, str]:
-    """Where a material says its base colour, and what its factor and texture are called there."""
+    """The object that holds a material's base colour, and the names of its factor and texture."""
     glossy = material.extension("KHR_materials_pbrSpecularGlossiness")
     if glossy is not None:
         return glossy, "diffuseFactor", "diffuseTexture"
@@ -95,10 +95,10 @@ def base(material: Entry) -> tuple[Entry | None, str, str]:
 
 
 def decoded(content: bytes, most: int) -> Texels:
-    """A PNG, JPEG or WebP image as (h, w, 4) uint8 sRGB, of at most `most` pixels.
+    """Decode a PNG, JPEG or WebP image of at most `most` pixels to (h, w, 4) uint8 sRGB.
 
     Raises:
-        MeshError: it is none of these, damaged, or larger.
+        MeshError: it has another format, is damaged, or is larger.
     """
     try:
         with warnings.catch_warnings():
@@ -124,7 +124,7 @@ def decoded(content: bytes, most: int) -> Texels:
 
 
 def texture_coordinates(file: GltfFile, material: int | None) -> tuple[str, NDArray[np.float64]]:
-    """Which attribute the base colour's texture is laid by, and (2, 3) that takes (u, v, 1) there.
+    """The attribute of the base colour's coordinates, and the transform (2, 3) of (u, v, 1).
 
     Source: extension KHR_texture_transform.
     """

@@ -1,4 +1,4 @@
-"""The triangles of a glTF file in scene coordinates, skinned for the default pose.
+"""Read the triangles of a glTF file in scene coordinates, skinned for the default pose.
 
 Source: Khronos, "glTF 2.0 Specification", section 3.7 (meshes, skins).
 """
@@ -47,10 +47,10 @@ class MeshPart:
 def read_parts(
     file: GltfFile, scene: Scene, look: MaterialReader
 ) -> tuple[list[MeshPart], list[str]]:
-    """Every primitive of the default scene that has triangles, and notes on those that have none.
+    """Read every primitive of the default scene that has triangles; note the others.
 
     Raises:
-        MeshError: an index, a count or a position makes no sense, or there is too much.
+        MeshError: an index, a count or a position is out of range, or there are too many.
     """
     parts: list[MeshPart] = []
     skipped = vertices = faces = 0
@@ -212,7 +212,7 @@ def _weights(
 
 
 def _normalized(weights: csr_array) -> csr_array:
-    """Rows divided by their sums; a vertex without any weight follows its skin's first joint."""
+    """Rows divided by their sums; a vertex without weight follows the first joint of its skin."""
     weights.eliminate_zeros()
     sums = weights.sum(axis=1)
     lost = np.flatnonzero(sums < 1e-9)

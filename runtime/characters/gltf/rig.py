@@ -1,4 +1,4 @@
-"""Characters from glTF 2.0, GLB and VRM files, with the rig that they bring."""
+"""Read characters from glTF 2.0, GLB and VRM files, with their rigs."""
 
 from __future__ import annotations
 
@@ -37,10 +37,10 @@ class GltfModel:
         uvs: (M, 2) as glTF has them, or None.
         materials: at least one.
         face_material: (F,) into `materials`.
-        skeleton: where the file's joints stand, or None if it has no rig.
+        skeleton: of the file's joints, or None if it has no rig.
         weights: (M, K) of the skeleton's K joints, rows sum to 1; None without a skeleton.
         faces_backward: the character faces -Z, as VRM 0.x has it, instead of +Z.
-        notes: what was left out or guessed, one short line each.
+        notes: omissions and guesses, one short line each.
     """
 
     file_vertices: Array
@@ -56,7 +56,7 @@ class GltfModel:
 
 
 def read_gltf(path: Path) -> GltfModel:
-    """Read a .glb, .gltf or .vrm file; a rig without a mesh is dressed as a lay figure.
+    """Read a .glb, .gltf or .vrm file; a rig without a mesh gets a wooden figure as its body.
 
     Raises:
         InputError: it cannot be read, is damaged or compressed, or holds neither mesh nor rig.
@@ -94,7 +94,7 @@ def _extensions(file: GltfFile) -> frozenset[str]:
 
 
 def _skin_joints(file: GltfFile, parts: list[MeshPart]) -> list[int]:
-    """The joints of the skins that the parts wear; of all skins if none wears one."""
+    """The joints of the skins that the parts use; of all skins if they use none."""
     count = len(file.entries("nodes"))
     worn = [file.entry("nodes", p.node).whole("skin") for p in parts if p.weights is not None]
     skins = list(dict.fromkeys(worn)) or list(range(len(file.entries("skins"))))
@@ -103,7 +103,7 @@ def _skin_joints(file: GltfFile, parts: list[MeshPart]) -> list[int]:
 
 
 def _humanoid_joints(file: GltfFile) -> list[int]:
-    """The nodes that a VRM file, 0.x or 1.0, calls bones of a human."""
+    """The nodes that a VRM file, 0.x or 1.0, lists as humanoid bones."""
     count = len(file.entries("nodes"))
     new = file.document.extension("VRMC_vrm")
     old = file.document.extension("VRM")
@@ -133,7 +133,7 @@ def _rig(file: GltfFile, scene: Scene, parts: list[MeshPart], joints: list[int])
         elif carrier is not None:
             weight[carrier] += len(part.vertices)
     if parts and not weight.any():
-        weight[:] = 1.0  # nothing is bound to a joint: all of them stay
+        weight[:] = 1.0  # nothing is bound to a joint: keep all joints
     names = [
         node.text("name", "") or f"node {index}" for index, node in enumerate(file.entries("nodes"))
     ]
@@ -141,12 +141,12 @@ def _rig(file: GltfFile, scene: Scene, parts: list[MeshPart], joints: list[int])
 
 
 def _carrier(scene: Scene, node: int, joints: set[int]) -> int | None:
-    """The joint that a node hangs on, or is."""
+    """The nearest joint at or above a node."""
     return next((other for other in (node, *scene.ancestors(node)) if other in joints), None)
 
 
 def _spans(skeleton: Skeleton, vertices: Array) -> bool:
-    """Whether a skeleton lies in the box of a mesh, a quarter larger, and is not tiny in it."""
+    """Whether a skeleton lies in a mesh's bounding box, enlarged by a quarter, and is not tiny."""
     lower, upper = vertices.min(axis=0), vertices.max(axis=0)
     size = np.linalg.norm(upper - lower)
     rest = skeleton.rest_positions
@@ -155,7 +155,7 @@ def _spans(skeleton: Skeleton, vertices: Array) -> bool:
 
 
 def _rigged(model: GltfModel, rig: Rig, scene: Scene, parts: list[MeshPart]) -> GltfModel:
-    """The model with its skeleton, every vertex bound to it; as it is if that is a single joint."""
+    """The model with its skeleton and weights for every vertex; unchanged for a single joint."""
     if len(rig.skeleton.names) < 2:
         return replace(model, notes=(*model.notes, "its joints stand at one place: left out"))
     count, known = len(scene.parents), len(rig.skeleton.names)
@@ -189,7 +189,7 @@ def _rigged(model: GltfModel, rig: Rig, scene: Scene, parts: list[MeshPart]) -> 
 def _surface(
     parts: list[MeshPart], look: MaterialReader, *, faces_backward: bool, notes: list[str]
 ) -> GltfModel:
-    """The parts joined, without a rig."""
+    """All parts as one model without a rig."""
     starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
     vertices = np.concatenate([part.vertices for part in parts])
     if not (np.abs(vertices) < 1e15).all():
@@ -220,7 +220,7 @@ def _surface(
 
 
 def _dressed(file: GltfFile, scene: Scene, joints: list[int]) -> GltfModel:
-    """A rig without a mesh, dressed as a lay figure."""
+    """A rig without a mesh, with a wooden figure as its body."""
     joints = joints or _humanoid_joints(file)
     if not joints:
         raise MeshError("it holds neither triangles nor a rig; export it with its mesh")
@@ -238,5 +238,5 @@ def _dressed(file: GltfFile, scene: Scene, joints: list[int]) -> GltfModel:
         skeleton=rig.skeleton,
         weights=weights,
         faces_backward="VRM" in _extensions(file),
-        notes=("the file holds a rig without a mesh: it is dressed as a lay figure",),
+        notes=("the file holds a rig without a mesh: a wooden figure is its body",),
     )

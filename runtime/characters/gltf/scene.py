@@ -1,4 +1,4 @@
-"""The node tree of a glTF file: who hangs on whom, and where each node stands in the scene.
+"""Read the node tree of a glTF file: parents and world transforms.
 
 Source: Khronos, "glTF 2.0 Specification", section 3.5.
 """
@@ -34,7 +34,7 @@ class Scene:
 
     @property
     def positions(self) -> NDArray[np.float64]:
-        """(n, 3) where the nodes stand."""
+        """The positions (n, 3) of the nodes."""
         return self.to_scene[:, :3, 3]
 
     def ancestors(self, node: int) -> list[int]:
@@ -73,7 +73,7 @@ def read_scene(file: GltfFile) -> Scene:
     if len(nodes) and depth.max() > MOST_DEPTH:
         raise MeshError(f"its nodes nest deeper than {MOST_DEPTH}; simplify the scene")
     to_scene = np.empty((len(nodes), 4, 4))
-    with np.errstate(all="ignore"):  # what overflows is refused just below
+    with np.errstate(all="ignore"):  # overflow is refused below
         for node in order:
             local = local_transform(nodes[node])
             to_scene[node] = local if parents[node] < 0 else to_scene[parents[node]] @ local
@@ -101,7 +101,7 @@ def _depth_first(roots: list[int], children: list[list[int]]) -> list[int]:
 
 
 def local_transform(node: Entry) -> NDArray[np.float64]:
-    """A node's matrix (4, 4), or the one that its translation, rotation and scale make."""
+    """A node's matrix (4, 4), given as it is or by translation, rotation and scale."""
     if "matrix" in node:
         matrix: NDArray[np.float64] = node.numbers("matrix", (0.0,) * 16).reshape(4, 4).T
         return matrix

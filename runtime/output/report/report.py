@@ -122,7 +122,7 @@ class Report:
             "fault": recorder.fault or None,
         }
 
-    def cast(self, character: Character) -> CharacterReport:
+    def add_character(self, character: Character) -> CharacterReport:
         """Add a character to the show."""
         part = CharacterReport(character)
         self._parts.append((character.name, part))

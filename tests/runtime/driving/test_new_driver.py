@@ -135,7 +135,7 @@ def test_a_new_driver_moves_a_character_through_loop_outputs_and_window(
     assert not session.matching, "it performs without a match"
     with ExitStack() as closing:
         report = closing.enter_context(Report(tmp_path / "report.json"))
-        kept, figures = Kept(), report.cast(puppet.character)
+        kept, figures = Kept(), report.add_character(puppet.character)
         scene = Scene(context, SIZE, [puppet], BODY)
         closing.callback(scene.close)
         loop = FrameLoop(

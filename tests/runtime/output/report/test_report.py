@@ -27,7 +27,7 @@ def test_the_report_has_the_keys_that_others_read(tmp_path: Path) -> None:
     character = make_tentacle()
     with Report(tmp_path / "r.json") as report:
         report.recorded(frames=np.int64(9), joints=25, seconds=np.float32(0.5))
-        part = report.cast(character)
+        part = report.add_character(character)
         drive = Drive((0, 1), tuple(np.arange(3)), flip=True)
         part.matched(Mapping((drive,), score=np.float32(0.75)), LEG)
         for frame in make_show(character, frames=7):
@@ -67,8 +67,8 @@ def test_the_report_has_the_keys_that_others_read(tmp_path: Path) -> None:
 def test_several_characters_are_listed_beside_the_first(tmp_path: Path) -> None:
     character = make_tentacle()
     with Report(tmp_path / "r.json") as report:
-        first = report.cast(character)
-        second = report.cast(replace(character, name="other"))
+        first = report.add_character(character)
+        second = report.add_character(replace(character, name="other"))
         second.matched(Mapping(()), LEG)
         for frame in make_show(character, frames=3):
             first.write(frame)
@@ -85,7 +85,7 @@ def test_several_characters_are_listed_beside_the_first(tmp_path: Path) -> None:
 def test_numbers_that_json_cannot_hold_become_null(tmp_path: Path) -> None:
     with Report(tmp_path / "r.json") as report:
         report.recorded(frames=1, joints=2, seconds=float("nan"))
-        report.cast(make_tentacle()).matched(Mapping((), score=float("-inf")), LEG)
+        report.add_character(make_tentacle()).matched(Mapping((), score=float("-inf")), LEG)
     written = json.loads((tmp_path / "r.json").read_text(), parse_constant=refuse)
     assert written["recording"]["seconds"] is None
     assert written["match"]["score"] is None
@@ -93,7 +93,7 @@ def test_numbers_that_json_cannot_hold_become_null(tmp_path: Path) -> None:
 
 def test_names_of_any_kind_can_be_written(tmp_path: Path) -> None:
     with Report(tmp_path / "r.json") as report:
-        part = report.cast(make_tentacle())
+        part = report.add_character(make_tentacle())
         names = ('"é\n', "\udc80")
         part.matched(Mapping((Drive((0, 1), (0, 1)),)), replace(LEG, names=names))
     pairs = json.loads((tmp_path / "r.json").read_bytes())["match"]["pairs"]
@@ -108,7 +108,7 @@ def test_a_show_that_never_began_is_reported_too(tmp_path: Path) -> None:
 def test_without_a_path_nothing_is_written_but_all_is_counted(tmp_path: Path) -> None:
     character = make_tentacle()
     with Report(None) as report:
-        part = report.cast(character)
+        part = report.add_character(character)
         part.write(make_show(character, frames=1)[0])
     assert report.summary()["frames"] == 1
     assert not list(tmp_path.iterdir())

@@ -64,7 +64,7 @@ def test_a_large_surface_is_looked_at_now_and_then(monkeypatch: pytest.MonkeyPat
 def test_the_report_holds_the_worst_of_the_show() -> None:
     character = make_tentacle()
     report = Report(None)
-    part = report.cast(character)
+    part = report.add_character(character)
     watched = Watched(character.vertices, character.faces)
     found = []
     for frame in make_show(character, frames=10):

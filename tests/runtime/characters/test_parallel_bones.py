@@ -7,8 +7,8 @@ from scipy.sparse import csr_array
 
 from devices.skeleton import Skeleton
 from runtime.characters.builtin import builtin_character
-from runtime.characters.bundles import unbundled
 from runtime.characters.character import Character
+from runtime.characters.parallel_bones import split_parallel_bones
 
 
 def with_skeleton(positions: list[tuple[float, float, float]], parents: list[int]) -> Character:
@@ -28,7 +28,7 @@ def test_fingers_that_hang_on_the_elbow_get_a_wrist() -> None:
         [(0, 0, 0), (1, 0, 0), (2, 0.1, 0), (2, 0, 0), (2, -0.1, 0), (1, 1, 0)],
         [-1, 0, 1, 1, 1, 1],
     )
-    after = unbundled(hand)
+    after = split_parallel_bones(hand)
     assert after.skeleton.names[6] == "joint1 parts"
     assert after.skeleton.parents.tolist() == [-1, 0, 6, 6, 6, 1, 1]
     np.testing.assert_allclose(after.skeleton.rest_positions[6], [1.85, 0.0, 0.0], atol=0.01)
@@ -39,9 +39,9 @@ def test_fingers_that_hang_on_the_elbow_get_a_wrist() -> None:
 
 def test_limbs_that_part_at_once_stay_as_they_are() -> None:
     fork = with_skeleton([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0.7, 0.7, 0)], [-1, 0, 0, 0])
-    assert unbundled(fork) is fork
+    assert split_parallel_bones(fork) is fork
 
 
 def test_built_in_characters_have_no_bundles() -> None:
     squid = builtin_character("squid")
-    assert unbundled(squid) is squid
+    assert split_parallel_bones(squid) is squid

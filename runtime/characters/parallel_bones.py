@@ -1,8 +1,8 @@
-"""Bones that run side by side are one limb until they part.
+"""Insert a node where bones that start at one joint and run side by side separate.
 
-Some rigs hang every finger on the forearm itself, so that four bones lie in one arm. The forearm
-would then be the place where limbs part, and the wrist no place at all. A node is put in where they
-really part, and the bones hang on it.
+Some rigs attach every finger to the forearm, so that four bones lie in one arm: the limbs would
+branch at the elbow, and there would be no wrist. The inserted node is the wrist; the finger bones
+start there.
 """
 
 from __future__ import annotations
@@ -16,30 +16,30 @@ from scipy.sparse import csr_array, hstack
 from devices.skeleton import Skeleton
 from runtime.characters.character import Character
 
-SIDE_BY_SIDE = np.cos(np.radians(20.0))  # of the angle between two bones of a bundle
-SHARED = 0.85  # of the shortest bone's length lies in the bundle
-LONG = 0.06  # of the character's size; what is shorter needs no wrist
+SIDE_BY_SIDE = np.cos(np.radians(20.0))  # least cosine between two parallel bones
+SHARED = 0.85  # distance of the new node from the joint, over the shortest bone's length
+LONG = 0.06  # least length of a bone, over the character's size
 
 Array = NDArray[np.float64]
 
 
-def unbundled(character: Character) -> Character:
-    """The character with a node put in wherever several bones of its skeleton run side by side."""
+def split_parallel_bones(character: Character) -> Character:
+    """Return the character with a node inserted wherever several of its bones run side by side."""
     skeleton = character.skeleton
     shortest = LONG * float(np.ptp(skeleton.rest_positions, axis=0).max())
     names, parents = list(skeleton.names), skeleton.parents.tolist()
     positions = list(skeleton.rest_positions)
     for node in range(len(skeleton.names)):
-        bundle = _bundle(node, parents, positions, shortest)
-        if len(bundle) < 2:
+        parallel = _parallel(node, parents, positions, shortest)
+        if len(parallel) < 2:
             continue
-        bones = np.array([positions[child] - positions[node] for child in bundle])
+        bones = np.array([positions[child] - positions[node] for child in parallel])
         lengths = np.linalg.norm(bones, axis=1)
         way = (bones / lengths[:, None]).mean(axis=0)
         positions.append(positions[node] + SHARED * lengths.min() * way)
         names.append(f"{skeleton.names[node]} parts")
         parents.append(node)
-        for child in bundle:
+        for child in parallel:
             parents[child] = len(names) - 1
     added = len(names) - len(skeleton.names)
     if added == 0:
@@ -54,8 +54,8 @@ def unbundled(character: Character) -> Character:
     )
 
 
-def _bundle(node: int, parents: list[int], positions: list[Array], shortest: float) -> list[int]:
-    """The children of a node whose bones run along the longest one's."""
+def _parallel(node: int, parents: list[int], positions: list[Array], shortest: float) -> list[int]:
+    """The children of a node whose bones run along its longest bone."""
     children = [child for child, parent in enumerate(parents) if parent == node]
     bones = [positions[child] - positions[node] for child in children]
     lengths = [float(np.linalg.norm(bone)) for bone in bones]
