@@ -31,7 +31,7 @@ from tests.devices.leap.leap_messages import HEADER, both, device_event
 from tests.devices.mediapipe.test_landmark_stream import SIZE, person, rows, seen_at
 from tests.devices.mediapipe.test_landmark_stream import message as landmarks
 
-COUNT = int(os.environ.get("BUNRAKU_MUTATIONS", "2000"))
+COUNT = int(os.environ.get("BUNRAKU_MUTATIONS", "1000"))
 TOKENS = [
     b"null",
     b"1e999",

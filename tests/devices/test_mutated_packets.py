@@ -27,7 +27,7 @@ from devices.transport.senders import Decoder
 from tests.devices import sender_packets as studio
 from tests.devices.vmc_sender import at, bones, bundle, message, ok, root, slime
 
-MUTATIONS = int(os.environ.get("BUNRAKU_MUTATIONS", "3000"))
+MUTATIONS = int(os.environ.get("BUNRAKU_MUTATIONS", "1000"))
 TRACED = 1000
 STEP = 1 / 250
 TURN = {"Hips": Rotation.from_euler("x", 0.3)}
