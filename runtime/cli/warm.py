@@ -26,7 +26,7 @@ from runtime.puppet.deformable_surface import Elasticity
 from runtime.render.smoothing import DeformingNormals, bounding_box, split_vertices
 from runtime.show.open_stream import play
 from runtime.show.progress import Progress
-from runtime.show.settings import ShowSettings
+from runtime.show.settings import CharacterSettings, ShowSettings
 from runtime.show.show import Show
 from solvers.arap import ENERGIES
 from solvers.kernels.cache import count_compiled, has_list, remove_unused, save_list
@@ -109,7 +109,12 @@ def use_solvers() -> None:
     for energy in ENERGIES:
         solver = SquashStretchSolver(x, faces, corners, energy=energy, groups=[0, 0, 1, 2])
         solver.stiffen(np.zeros(len(x), dtype=np.int64), np.ones(len(x)))
-        for elasticity in (Elasticity(), Elasticity(1.0, 1.5, 0.5)):
+        for elasticity in (
+            Elasticity(),
+            Elasticity(cartoon=1.0, volume_gain=1.5),
+            Elasticity(cartoon=1.0, stiffness=0.5),
+            Elasticity(stiffness=0.5),
+        ):
             solver.cartoon, solver.volume_gain = elasticity.cartoon, elasticity.volume_gain
             solver.stiffness = elasticity.stiffness
             answer = solver.solve(x[corners][::-1], 2)  # a jump
@@ -150,8 +155,9 @@ def _use_decoders_and_surfaces() -> None:
 def _perform() -> None:
     """Perform a few frames with every built-in character."""
     characters = [builtin_character(name) for name in BUILTIN]
-    stream = play(builtin_recording(), every_frame=True)
-    with Show(stream, characters, ShowSettings()) as show:
+    elastic = CharacterSettings(cartoon=1.0, volume_gain=1.5, stiffness=0.5)
+    settings = ShowSettings(characters=(elastic, *[CharacterSettings()] * (len(characters) - 1)))
+    with Show(play(builtin_recording(), every_frame=True), characters, settings) as show:
         for _ in range(_FRAMES):
             show.tick()
 

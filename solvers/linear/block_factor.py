@@ -49,8 +49,9 @@ class BlockFactor:
         """
         stale = stale_tasks(self._entries, values, self._blocks, self._schedule)
         self._entries.values[:] = values
-        self._factorise(stale)
-        self._check(rounds=1)
+        with one_blas_thread():
+            self._factorise(stale)
+            self._check(rounds=1)
 
     def restore(self, values: Floats, precision: np.dtype[Any]) -> None:
         """Factor these values as `refactor` does, in the precision of an earlier time.
@@ -62,7 +63,8 @@ class BlockFactor:
         if precision != self.precision:
             self._allocate(precision)
             stale[:] = True
-        self._factorise(stale)
+        with one_blas_thread():
+            self._factorise(stale)
 
     def add_solution(self, b: Floats, x: Floats) -> None:
         """Add the solution y of A y = b, both (n, 3), to the first n rows of x."""
@@ -97,8 +99,9 @@ class BlockFactor:
     def _fill(self, precision: np.dtype[Any]) -> None:
         """Compute all panels in one precision."""
         self._allocate(precision)
-        self._factorise(np.ones(len(self._schedule.task_firsts), np.bool_))
-        self._check(rounds=3)
+        with one_blas_thread():
+            self._factorise(np.ones(len(self._schedule.task_firsts), np.bool_))
+            self._check(rounds=3)
 
     def _factorise(self, stale: NDArray[np.bool_]) -> None:
         """Compute the panels of stale tasks (tasks,) and of the blocks above."""
@@ -106,8 +109,7 @@ class BlockFactor:
             values = Values(Panels(*np.zeros((2, 0), np.float32)), self._panels)
         else:
             values = Values(self._panels, Panels(*np.zeros((2, 0))))
-        with one_blas_thread():
-            factorise(self._entries, stale, self._blocks, values, self._schedule, self._updates)
+        factorise(self._entries, stale, self._blocks, values, self._schedule, self._updates)
 
     def _check(self, rounds: int) -> None:
         """Go over to double precision, for good, where single precision loses too much."""

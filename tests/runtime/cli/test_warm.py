@@ -56,6 +56,21 @@ proxy_of(characters[0], dense=0, count=2_000)
 use_solvers()
 print("compiled:", *compiled)
 """
+MISSED = """
+from numba.core.registry import cpu_target
+from runtime.cli.warm import _NOT_SHOWN, _SHOW, _SOLVERS, warm_up
+from solvers.kernels import cache
+from solvers.kernels.fingerprint import _own
+
+warm_up()
+lists = [cache.FOLDER / cache._list_name(part, _NOT_SHOWN) for part in (_SOLVERS, _SHOW)]
+stems = {name.rpartition("-")[0] for path in lists for name in path.read_text().split()}
+kernels = cache._known(_NOT_SHOWN)
+called = {callee for kernel in kernels for callee in _own(kernel)[1]}
+codegen = cpu_target.target_context.codegen()
+missed = [kernel for kernel in kernels if cache._stem(kernel, codegen) not in stems]
+print("missed:", *(kernel.py_func.__qualname__ for kernel in missed if kernel not in called))
+"""
 
 
 def test_a_show_compiles_nothing_after_a_warm_up() -> None:
@@ -64,6 +79,14 @@ def test_a_show_compiles_nothing_after_a_warm_up() -> None:
     )
     assert run.returncode == 0, run.stderr
     assert run.stdout == "compiled:\n"
+
+
+def test_a_warm_up_uses_every_kernel_that_no_other_kernel_calls() -> None:
+    run = subprocess.run(
+        [sys.executable, "-c", MISSED], cwd=CHECKOUT, capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 0, run.stderr
+    assert run.stdout == "missed:\n"
 
 
 def test_every_module_with_kernels_is_loaded_before_its_kernels_are_listed() -> None:
