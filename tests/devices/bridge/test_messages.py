@@ -35,7 +35,7 @@ from devices.builtin.body import builtin_skeleton
 from devices.errors import InputError
 from devices.skeleton import Skeleton, SkeletonFrame
 
-MUTATIONS = int(os.environ.get("BUNRAKU_MUTATIONS", "10000"))
+MUTATIONS = int(os.environ.get("BUNRAKU_MUTATIONS", "3000"))
 BODY = builtin_skeleton()
 U64 = st.integers(0, 2**64 - 1)
 TIMES = st.floats(-1e9, 1e9)
