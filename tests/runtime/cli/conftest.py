@@ -30,8 +30,25 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture
-def bunraku(tmp_path: Path) -> Run:
-    """Runs the program in a folder of its own."""
+def bunraku(in_folder: Path, capfd: pytest.CaptureFixture[str]) -> Run:
+    """Runs commands of the program within this process, which saves its start, in `tmp_path`."""
+    from runtime.cli import main
+
+    def run(*arguments: object) -> subprocess.CompletedProcess[str]:
+        capfd.readouterr()
+        try:
+            code = main(list(map(str, arguments)))
+        except SystemExit as ended:  # as --help ends
+            code = int(ended.code or 0)
+        out, err = capfd.readouterr()
+        return subprocess.CompletedProcess(arguments, code, out, err)
+
+    return run
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> Run:
+    """Runs the program as a process of its own, in `tmp_path`."""
 
     def run(*arguments: object) -> subprocess.CompletedProcess[str]:
         return subprocess.run(

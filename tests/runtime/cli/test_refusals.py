@@ -51,22 +51,18 @@ BAD_MESHES = {
 
 
 @pytest.mark.parametrize("name", BAD_FILES)
-def test_bad_recordings_are_refused(
-    name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_bad_recordings_are_refused(name: str, tmp_path: Path, bunraku: Run) -> None:
     path = tmp_path / name
     path.write_bytes(BAD_FILES[name])
-    _refused(_in_process(capsys, "replay", path, "--character", "paper", *SMALL), name)
-    _refused(_in_process(capsys, "info", path), name)
+    _refused(bunraku("replay", path, "--character", "paper", *SMALL), name)
+    _refused(bunraku("info", path), name)
 
 
 @pytest.mark.parametrize("name", BAD_MESHES)
-def test_bad_meshes_are_refused(
-    name: str, recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_bad_meshes_are_refused(name: str, recording: Path, tmp_path: Path, bunraku: Run) -> None:
     path = tmp_path / name
     path.write_bytes(BAD_MESHES[name])
-    _refused(_in_process(capsys, "replay", recording, "--character", path, *SMALL), name)
+    _refused(bunraku("replay", recording, "--character", path, *SMALL), name)
 
 
 @pytest.mark.parametrize(
@@ -102,14 +98,14 @@ def test_bad_meshes_are_refused(
 def test_bad_options_are_refused_and_nothing_is_written(
     recording: Path,
     in_folder: Path,
-    capsys: pytest.CaptureFixture[str],
+    bunraku: Run,
     options: list[str],
     about: list[str],
 ) -> None:
     show = ["replay", recording, "--headless", "--fast", "--cache", "kept.pc2", *options]
     if "--character" not in options:
         show[2:2] = ["--character", "paper"]
-    _refused(_in_process(capsys, *show), *about)
+    _refused(bunraku(*show), *about)
     assert list(in_folder.iterdir()) == []
 
 
@@ -133,48 +129,30 @@ def test_bad_options_are_refused_and_nothing_is_written(
     ids=lambda value: " ".join(value)[:40],
 )
 def test_bad_commands_are_refused(
-    in_folder: Path, capsys: pytest.CaptureFixture[str], command: list[str], about: list[str]
+    in_folder: Path, bunraku: Run, command: list[str], about: list[str]
 ) -> None:
-    _refused(_in_process(capsys, *command), *about)
+    _refused(bunraku(*command), *about)
     assert list(in_folder.iterdir()) == []
 
 
-def test_a_refusal_looks_so_from_outside(bunraku: Run, recording: Path) -> None:
-    _refused(bunraku("replay", recording, "--character", "nobody"), "nobody")
+def test_a_refusal_looks_so_from_outside(program: Run, recording: Path) -> None:
+    _refused(program("replay", recording, "--character", "nobody"), "nobody")
 
 
 def test_nothing_is_written_over_what_is_read(
-    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    recording: Path, tmp_path: Path, bunraku: Run
 ) -> None:
     before = recording.read_bytes()
     link = tmp_path / "link.mcap"
     link.hardlink_to(recording)
     for out in (recording, link):
-        done = _in_process(
-            capsys, "replay", recording, "--character", "paper", *SMALL, "--record", out
-        )
+        done = bunraku("replay", recording, "--character", "paper", *SMALL, "--record", out)
         _refused(done, "--record", "RECORDING")
     assert recording.read_bytes() == before
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
 @pytest.mark.parametrize("option", ["--cache", "--report", "--record"])
-def test_a_full_disk_is_told_in_one_line(
-    recording: Path, capsys: pytest.CaptureFixture[str], option: str
-) -> None:
-    done = _in_process(
-        capsys, "replay", recording, "--character", "paper", *SMALL, option, "/dev/full"
-    )
+def test_a_full_disk_is_told_in_one_line(recording: Path, bunraku: Run, option: str) -> None:
+    done = bunraku("replay", recording, "--character", "paper", *SMALL, option, "/dev/full")
     _refused(done, "/dev/full")
-
-
-def _in_process(
-    capsys: pytest.CaptureFixture[str], *arguments: object
-) -> subprocess.CompletedProcess[str]:
-    """The same without a process of its own, which takes most of a second."""
-    from runtime.cli import main
-
-    capsys.readouterr()
-    code = main(list(map(str, arguments)))
-    out, err = capsys.readouterr()
-    return subprocess.CompletedProcess([], code, out, err)

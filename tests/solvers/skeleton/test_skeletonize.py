@@ -198,9 +198,9 @@ def test_no_face_and_positions_that_are_not_finite_are_refused() -> None:
         extract_skeleton(vertices, np.array([[0, 1, 2]]))
 
 
-@settings(max_examples=12, deadline=None)
+@settings(max_examples=6, deadline=None)
 @example(13, 1799548, 0.015625, False)  # specks, more of them at one end
-@given(st.integers(1, 60), st.integers(0, 2**32 - 1), st.floats(0.001, 1.0), st.booleans())
+@given(st.integers(1, 40), st.integers(0, 2**32 - 1), st.floats(0.001, 1.0), st.booleans())
 def test_any_soup_gives_a_tree(faces: int, seed: int, size: float, flat: bool) -> None:
     random = np.random.default_rng(seed)
     middles = random.uniform(-1.0, 1.0, (faces, 1, 3))
