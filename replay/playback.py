@@ -1,4 +1,4 @@
-"""Playback: what a puppeteer can do to a recording while it plays, and not to a live stream."""
+"""The controls of a playing recording: position, speed, pause, loop; live streams have none."""
 
 from __future__ import annotations
 

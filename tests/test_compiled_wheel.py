@@ -7,7 +7,7 @@ import importlib.util
 import io
 import sys
 from pathlib import Path
-from types import ModuleType
+from types import ModuleType, SimpleNamespace
 from zipfile import ZipFile
 
 import pytest
@@ -102,10 +102,12 @@ def test_the_processor_is_chosen_before_numba_is_loaded(
     chosen: str | None,
 ) -> None:
     environment: dict[str, str] = {} if asked is None else {"NUMBA_CPU_NAME": asked}
-    monkeypatch.setattr(processor.os, "environ", environment)
+    monkeypatch.setattr(processor, "os", SimpleNamespace(environ=environment))
     monkeypatch.setattr(processor, "PACKED", tmp_path if packed else tmp_path / "none")
     monkeypatch.setattr(processor, "_host_features", lambda: HASWELL if able else {})
-    if not loaded:
+    if loaded:
+        monkeypatch.setitem(sys.modules, "numba", ModuleType("numba"))
+    else:
         monkeypatch.delitem(sys.modules, "numba", raising=False)
     processor.choose_processor()
     assert environment.get("NUMBA_CPU_NAME") == chosen

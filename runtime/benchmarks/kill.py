@@ -1,4 +1,4 @@
-"""Benchmark: `kill -9` during a recording of four performers; readable files, missing time."""
+"""Benchmark: kills a recorder while it writes; checks that its files open, and what is missing."""
 
 from __future__ import annotations
 

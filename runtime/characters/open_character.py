@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from devices.errors import InputError
 from runtime.characters.builtin import BUILTIN, builtin_character
 from runtime.characters.character import Character
 from runtime.characters.character_file import SUFFIXES, read_character
@@ -30,4 +31,9 @@ def load_character(name: str | Path) -> Character:
     """
     if str(name) in BUILTIN:
         return builtin_character(str(name))
+    if not Path(name).suffix and not Path(name).exists():
+        raise InputError(
+            f"no character is called {str(name)!r}: give the path of a mesh or rig file, or one of "
+            f"{', '.join(BUILTIN)}"
+        )
     return turned_to_best_side(split_parallel_bones(read_character(Path(name))))

@@ -53,7 +53,8 @@ def add_character_option(parser: argparse.ArgumentParser, *, required: bool) -> 
         action="append",
         required=required,
         metavar="C",
-        help="a mesh (obj, ply, stl, off, glb, gltf, vrm) or a built-in character; may be repeated",
+        help="a mesh (obj, ply, stl, off, mesh, glb, gltf, vrm) or a built-in character; may be "
+        "repeated",
     )
 
 
@@ -288,8 +289,8 @@ def _add_deformation(parser: argparse.ArgumentParser) -> None:
         action="append",
         type=gain,
         metavar="X",
-        help="share of the volume that is kept while a part squashes and stretches; more than 1 "
-        "exaggerates (default 1)",
+        help="share of the volume lost while a part squashes and stretches that is restored; more "
+        "than 1 exaggerates (default 1)",
     )
     made.add_argument(
         "--stiffness",

@@ -54,6 +54,12 @@ class Driver(Protocol):
 
     @property
     @abstractmethod
+    def poses_nodes(self) -> bool:
+        """Whether the targets have posed nodes, which exports of a skeleton require."""
+        ...
+
+    @property
+    @abstractmethod
     def highlights(self) -> Sequence[Highlight]:
         """The polylines to light up, before the placement, in the order of their colours."""
         ...

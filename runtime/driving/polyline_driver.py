@@ -127,6 +127,7 @@ class PolylineDriver(MappedDriver):
     """
 
     needs = Needs()
+    poses_nodes = True
 
     def __init__(
         self,

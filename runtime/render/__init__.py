@@ -1,1 +1,1 @@
-"""The puppet stage drawn with moderngl: the only part of the runtime that touches GL."""
+"""The stage, drawn with moderngl; beside the window, only this package calls OpenGL."""

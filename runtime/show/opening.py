@@ -28,6 +28,7 @@ from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer
 from runtime.driving.puppet_match import Choices
 from runtime.driving.rehearsal import rehearse
+from runtime.output.files.export import OF_NODES
 from runtime.output.output import Output
 from runtime.output.report.report import Report
 from runtime.puppet.deformable_surface import Elasticity
@@ -102,6 +103,7 @@ class OpenedShow:
         self._shown = self._window is not None or context is not None
         self.scene = self._open_scene(context, make_scene)
         self.acts = self._open_acts(first)
+        self._check_export()
         if self._recording is not None and settings.match.rehearse:
             self._rehearse(self._recording)
         with interrupts_deferred():  # files come last, when nothing else can fail
@@ -245,6 +247,22 @@ class OpenedShow:
         known = [corners for corners in filled if corners is not None]
         if self.scene is not None:
             self.scene.frame_all(np.concatenate(known) if len(known) == len(filled) else None)
+
+    def _check_export(self) -> None:
+        """Refuse to export nodes that no driver poses, before a file is touched.
+
+        Raises:
+            InputError: a driver poses no nodes, and the export needs them.
+        """
+        export = self._settings.files.export
+        if export is None or export.suffix.lower() not in OF_NODES:
+            return
+        for puppet in self.puppets:
+            if puppet.driver is not None and not puppet.driver.poses_nodes:
+                raise InputError(
+                    f"cannot export {export}: the driver of {puppet.character.name} poses no "
+                    "nodes; export a .usdc, which holds the surface, or choose another driver"
+                )
 
     def _open_loop(self, own: Sequence[Output]) -> FrameLoop:
         self._closing.enter_context(self.report)

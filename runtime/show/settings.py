@@ -13,6 +13,8 @@ from runtime.render.background import Background
 
 LEAST_SIDE, MOST_SIDE = 16, 8192  # pixels of a picture's width and height
 MOST_VOLUME_GAIN = 10.0
+MOST_PORT = 65535
+PORTS = f"0 to {MOST_PORT}"
 MOST_STIFFNESS = 0.99  # with 1 a limb could not bend at all, and the solver would have no answer
 ENERGIES = ("spokes", "spokes-and-rims", "smooth-rotations")
 
@@ -26,8 +28,8 @@ class CharacterSettings:
 
     Attributes:
         cartoon: 0 keeps every part rigid; 1 lets it squash and stretch with its motion.
-        volume_gain: share of the volume that is kept while it squashes and stretches, 0 to 10;
-            more than 1 exaggerates.
+        volume_gain: share of the volume lost while it squashes and stretches that is restored, 0
+            to 10; more than 1 exaggerates.
         stiffness: 0 lets limbs bend along their whole length; towards 1 they bend at their joints
             only; 0 to 0.99.
         energy: what the solver keeps as rigid as possible, one of `ENERGIES`.
@@ -142,7 +144,7 @@ class SenderSettings:
         publish_keys: folder with the keys that `publish` needs beyond this machine.
 
     Raises:
-        InputError: a value is no `Path`; the message names the setting.
+        InputError: a value is out of range; the message names the setting.
     """
 
     virtual_camera: str | None = None
@@ -153,6 +155,8 @@ class SenderSettings:
     publish_keys: Path | None = None
 
     def __post_init__(self) -> None:
+        if self.vmc is not None:
+            _check_address(self, "vmc")
         _check_path(self, "publish_keys")
 
 
@@ -163,10 +167,18 @@ class RemoteSettings:
     Attributes:
         address: where the show listens; the usual port is 9100.
         feedback_port: where the remote control listens; None: the port that it sends from.
+
+    Raises:
+        InputError: a value is out of range; the message names the setting.
     """
 
     address: Address
     feedback_port: int | None = None
+
+    def __post_init__(self) -> None:
+        _check_address(self, "address")
+        if self.feedback_port is not None and not _is_port(self.feedback_port):
+            raise _refusal(self, "feedback_port", PORTS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -211,12 +223,22 @@ class ShowSettings:
     origin: str = ""
 
     def __post_init__(self) -> None:
-        if len(self.size) != 2 or not all(LEAST_SIDE <= side <= MOST_SIDE for side in self.size):
-            raise _refusal(self, "size", f"each side {LEAST_SIDE} to {MOST_SIDE} pixels")
-        if not 0.0 < self.fps < math.inf:
+        size: object = self.size
+        if not isinstance(size, tuple) or len(size) != 2 or not all(map(_is_side, size)):
+            raise _refusal(self, "size", f"two whole numbers from {LEAST_SIDE} to {MOST_SIDE}")
+        if not _is_number(self.fps) or not 0.0 < self.fps < math.inf:
             raise _refusal(self, "fps", "a finite number above 0")
-        if not self.characters:
-            raise _refusal(self, "characters", "the settings of one character or more")
+        if not isinstance(self.background, Background | None):
+            raise _refusal(self, "background", "a Background or None")
+        own: object = self.characters
+        if (
+            not isinstance(own, tuple)
+            or not own
+            or not all(isinstance(one, CharacterSettings) for one in own)
+        ):
+            raise _refusal(self, "characters", "a tuple of CharacterSettings, one at least")
+        if not all(isinstance(on, bool) for on in self.conditioning.values()):
+            raise _refusal(self, "conditioning", "True or False for each step")
         unknown = sorted(set(self.conditioning) - set(SWITCHES))
         if unknown:
             raise InputError(
@@ -237,17 +259,48 @@ class ShowSettings:
         return self.pictures or any(one is not None for one in asked)
 
 
-Settings = CharacterSettings | MatchSettings | FileSettings | SenderSettings | ShowSettings
+Settings = (
+    CharacterSettings
+    | MatchSettings
+    | FileSettings
+    | SenderSettings
+    | RemoteSettings
+    | ShowSettings
+)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _is_side(value: object) -> bool:
+    return isinstance(value, int) and LEAST_SIDE <= value <= MOST_SIDE
+
+
+def _is_port(value: object) -> bool:
+    return isinstance(value, int) and not isinstance(value, bool) and 0 <= value <= MOST_PORT
+
+
+def _check_address(settings: Settings, name: str) -> None:
+    value: object = getattr(settings, name)
+    if (
+        not isinstance(value, tuple)
+        or len(value) != 2
+        or not isinstance(value[0], str)
+        or not (value[1] is None or _is_port(value[1]))
+    ):
+        raise _refusal(settings, name, f"a host and a port, {PORTS}, or None for the usual one")
 
 
 def _check_range(settings: Settings, name: str, low: float, high: float) -> None:
-    if not low <= getattr(settings, name) <= high:
+    value = getattr(settings, name)
+    if not _is_number(value) or not low <= value <= high:
         raise _refusal(settings, name, f"a number from {low:g} to {high:g}")
 
 
 def _check_count(settings: Settings, name: str) -> None:
     value = getattr(settings, name)
-    if not isinstance(value, int) or not 1 <= value <= 1_000_000:
+    if not isinstance(value, int) or isinstance(value, bool) or not 1 <= value <= 1_000_000:
         raise _refusal(settings, name, "a whole number from 1")
 
 

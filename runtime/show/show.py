@@ -207,6 +207,9 @@ class Show:
     def seek(self, seconds: float) -> None:
         """Go on from the first frame at or after `seconds` of the recording.
 
+        Surfaces, filters and matches go on from their present state. For the same bytes as playing
+        to that frame, jump with `runtime.show.history.ShowHistory`.
+
         Raises:
             ValueError: the stream is live.
         """

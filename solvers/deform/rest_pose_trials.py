@@ -1,4 +1,4 @@
-"""When a solver tries the rest pose, moved along with the handles, in place of its last answer.
+"""Decides when a solver also tries the rest pose, moved along with the handles, as its start.
 
 After a jump the last answer may be a bad start. Small steps add up as well: a slow full turn leaves
 a twist behind. So the rest pose is tried after a jump and, while the handles move, every few

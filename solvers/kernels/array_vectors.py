@@ -1,4 +1,4 @@
-"""The vectors of `solvers.kernels.vectors` as small arrays: the same answers, but slower."""
+"""Fall-back for `llvm_vectors` without numba's internals: small arrays, same answers, slower."""
 
 from __future__ import annotations
 

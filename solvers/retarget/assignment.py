@@ -1,4 +1,4 @@
-"""Lists the best assignments of rows to columns over many small tables, best first.
+"""Lists the best pairings of performer limbs with character limbs, best first.
 
 For each choice of columns only its best permutation counts, as in AniMesh (Jin et al. 2015),
 section 4.2. Each table's best choice is a linear assignment (Kuhn 1955, shortest augmenting paths);

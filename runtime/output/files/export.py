@@ -12,6 +12,7 @@ from runtime.output.files.whole_file import check_suffix
 from runtime.output.output import Output
 
 SUFFIXES = (".glb", ".usdc", ".usda", ".bvh")
+OF_NODES = (".glb", ".bvh")  # the exports of a skeleton's motion, which need posed nodes
 
 
 def open_export(path: Path, character: Character, *, rate: float = 30.0) -> Output:

@@ -34,6 +34,8 @@ from runtime.puppet.puppet import Puppet
 from runtime.show.act_group import Act
 from runtime.show.loop import FrameLoop
 from runtime.show.scene import Scene
+from runtime.show.settings import FileSettings, ShowSettings
+from runtime.show.show import Show
 from solvers.deform.handles import HARD
 from tests.runtime.output.files.test_point_cache import read_pc2
 from tests.runtime.show.loops import Kept, Wire
@@ -47,6 +49,7 @@ class _New:
     """What the two drivers have in common: how high the performer's left hand is."""
 
     needs = Needs()
+    poses_nodes = False
     highlights: Sequence[Highlight] = ()
 
     def __init__(
@@ -228,6 +231,24 @@ def test_an_export_of_nodes_says_that_the_driver_poses_none(
         with pytest.raises(InputError, match=r"poses none: .*--cache") as told:
             loop.tick()
     assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize("suffix", [".bvh", ".glb"])
+def test_a_show_refuses_such_an_export_before_it_touches_a_file(
+    suffix: str, tmp_path: Path
+) -> None:
+    earlier = tmp_path / f"a{suffix}"
+    earlier.write_text("an earlier performance")
+    files = FileSettings(export=earlier, cache=tmp_path / "a.pc2")
+    with pytest.raises(InputError, match=r"poses no nodes; export a \.usdc"):
+        Show(
+            Player(record(waving(FRAMES)), EveryFrame()),
+            [make_figure()],
+            ShowSettings(files=files),
+            make_driver=Twister,
+        )
+    assert earlier.read_text() == "an earlier performance"
+    assert not (tmp_path / "a.pc2").exists()
 
 
 def test_what_a_driver_needs_is_there_or_is_told() -> None:

@@ -188,14 +188,16 @@ def test_threads_change_nothing_and_nothing_is_allocated():
         surface.follow(moved, alone)
     finally:
         numba.set_num_threads(before)
-    tracemalloc.start()
-    try:
-        surface.follow(moved, out)
-        peak = tracemalloc.get_traced_memory()[1]
-    finally:
-        tracemalloc.stop()
+    peaks = []  # the least counts: other threads of a test run allocate now and then
+    for _ in range(5):
+        tracemalloc.start()
+        try:
+            surface.follow(moved, out)
+            peaks.append(tracemalloc.get_traced_memory()[1])
+        finally:
+            tracemalloc.stop()
     np.testing.assert_array_equal(out, alone)
-    assert peak < vertices.nbytes / 4  # an array of vertices is all; other threads count
+    assert min(peaks) < vertices.nbytes / 10
 
 
 def test_wrong_shapes_are_refused():
