@@ -57,7 +57,7 @@ class Character:
         skeleton: its nodes as a tree, from the file's rig or extracted from the surface.
         weights: (N, K) skin weights of the file's rig, rows sum to 1, or None.
         surface: for drawing.
-        placement: (4, 4) takes file coordinates to stage coordinates: rotation, uniform scale,
+        file_to_stage: (4, 4) takes file coordinates to stage coordinates: rotation, uniform scale,
             translation.
         notes: guesses and repairs, one short line each.
     """
@@ -68,11 +68,11 @@ class Character:
     skeleton: Skeleton
     weights: csr_array | None
     surface: Surface
-    placement: NDArray[np.float64]
+    file_to_stage: NDArray[np.float64]
     notes: tuple[str, ...] = ()
 
     def in_file_coordinates(self, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return file vertices (M, 3) in the file's frame for deformed welded vertices (N, 3)."""
-        to_file = np.asarray(np.linalg.inv(self.placement), dtype=np.float64)
+        to_file = np.asarray(np.linalg.inv(self.file_to_stage), dtype=np.float64)
         placed: NDArray[np.float64] = vertices[self.surface.vertex] @ to_file[:3, :3].T
         return placed + to_file[:3, 3]

@@ -14,17 +14,17 @@ from devices.skeleton import Skeleton
 from runtime.characters.builtin import BUILTIN
 from runtime.characters.cache import cached_skeleton
 from runtime.characters.character import Character, Surface
+from runtime.characters.file_to_stage import (
+    ABOUT_FACE,
+    UPRIGHT,
+    file_to_stage_matrix,
+    guess_rotation,
+    placed,
+)
 from runtime.characters.formats.mesh_data import FileMesh, MeshError
 from runtime.characters.formats.mesh_file import MESH_SUFFIXES, checked, read_mesh_file
 from runtime.characters.gltf.rig import read_gltf
 from runtime.characters.palette import palette_color
-from runtime.characters.placement import (
-    ABOUT_FACE,
-    UPRIGHT,
-    guess_rotation,
-    placed,
-    placement_matrix,
-)
 from runtime.characters.weld import first_occurrences, weld, welded_weights
 
 RIG_SUFFIXES = (".glb", ".gltf", ".vrm")
@@ -91,14 +91,16 @@ def _standing(
 ) -> Character:
     """Build the character on the stage; the rig holds the file's joints and weights (M, K)."""
     welded, faces = mesh.vertices[first_occurrences(vertex)], vertex[mesh.faces]
-    placement = placement_matrix(rotation, welded[np.unique(faces)])
-    vertices = placed(placement, welded)
+    file_to_stage = file_to_stage_matrix(rotation, welded[np.unique(faces)])
+    vertices = placed(file_to_stage, welded)
     weights = None
     if rig is None:
         skeleton = _extracted(vertices, faces, path)
     else:
         joints, weights = rig[0], welded_weights(rig[1], vertex)
-        skeleton = Skeleton(joints.names, joints.parents, placed(placement, joints.rest_positions))
+        skeleton = Skeleton(
+            joints.names, joints.parents, placed(file_to_stage, joints.rest_positions)
+        )
     return Character(
         name=path.stem,
         vertices=vertices,
@@ -106,7 +108,7 @@ def _standing(
         skeleton=skeleton,
         weights=weights,
         surface=_surface(mesh, vertex),
-        placement=placement,
+        file_to_stage=file_to_stage,
         notes=mesh.notes,
     )
 

@@ -27,15 +27,15 @@ def turned_to_best_side(character: Character) -> Character:
     if length < LONG * width or _bones_seen(character, 2) < MORE * _bones_seen(character, 0):
         return character
     skeleton = character.skeleton
-    placement = np.eye(4)
-    placement[:3, :3] = _TO_THE_LEFT
+    to_the_left = np.eye(4)
+    to_the_left[:3, :3] = _TO_THE_LEFT
     return replace(
         character,
         vertices=character.vertices @ _TO_THE_LEFT.T,
         skeleton=Skeleton(
             skeleton.names, skeleton.parents, skeleton.rest_positions @ _TO_THE_LEFT.T
         ),
-        placement=placement @ character.placement,
+        file_to_stage=to_the_left @ character.file_to_stage,
         notes=(*character.notes, "shows more from the side: turned to its left"),
     )
 

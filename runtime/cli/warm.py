@@ -25,7 +25,7 @@ from runtime.characters.builtin import BUILTIN, builtin_character
 from runtime.characters.proxy import proxy_of
 from runtime.driving.performer import Performer
 from runtime.puppet.deformable_surface import Elasticity
-from runtime.render.smoothing import DeformingNormals, bounding_box, split_vertices
+from runtime.render.normals import DeformingNormals, bounding_box, split_vertices
 from runtime.show.open_stream import play
 from runtime.show.progress import Progress
 from runtime.show.settings import CharacterSettings, ShowSettings

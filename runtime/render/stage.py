@@ -13,10 +13,10 @@ from runtime.render.camera import Camera
 from runtime.render.caption import CaptionPainter
 from runtime.render.floor import Floor, ShadowMaps
 from runtime.render.frame import FRAME, MAX_POOLS, Lighting, covered, frame_block, lighting
+from runtime.render.framebuffers import Framebuffers
 from runtime.render.inset import InsetPainter, SkeletonInset
 from runtime.render.programs import FRAME_BINDING, link, release_all
 from runtime.render.stage_character import CharacterPrograms, StageCharacter
-from runtime.render.targets import Targets
 from runtime.render.tubes import TubePainter
 
 CLIP_DISTANCE0 = 0x3000
@@ -76,23 +76,23 @@ class Stage:
         self._fill_array = context.vertex_array(self._fill_program, [])
         self._frame = context.buffer(reserve=FRAME.itemsize, dynamic=True)
         self._reflected_frame = context.buffer(reserve=FRAME.itemsize, dynamic=True)
-        self._targets = self._make_targets(size)
+        self._framebuffers = self._make_framebuffers(size)
         self._kept_backdrop = b""
         self._seen = (0, 0, *size)
 
-    def _make_targets(self, size: tuple[int, int]) -> Targets:
+    def _make_framebuffers(self, size: tuple[int, int]) -> Framebuffers:
         largest = min(int(self._context.info["GL_MAX_TEXTURE_SIZE"]), 16384)
         if not (0 < size[0] <= largest and 0 < size[1] <= largest):
             raise InputError(
                 f"a picture of {size[0]}x{size[1]} pixels cannot be drawn here; "
                 f"choose a --size from 1x1 to {largest}x{largest}"
             )
-        return Targets(self._context, (int(size[0]), int(size[1])), self._samples)
+        return Framebuffers(self._context, (int(size[0]), int(size[1])), self._samples)
 
     @property
     def size(self) -> tuple[int, int]:
         """Width and height of the picture [px]."""
-        return self._targets.size
+        return self._framebuffers.size
 
     @property
     def aspect(self) -> float:
@@ -135,8 +135,8 @@ class Stage:
     def resize(self, size: tuple[int, int]) -> None:
         """Change the size of the picture [px]."""
         if tuple(size) != self.size:
-            self._targets.release()
-            self._targets = self._make_targets(size)
+            self._framebuffers.release()
+            self._framebuffers = self._make_framebuffers(size)
             self._kept_backdrop = b""
 
     def draw(self, camera: Camera, inset: SkeletonInset | None = None) -> None:
@@ -155,7 +155,7 @@ class Stage:
         if self._background is None:
             self._draw_floor_and_curtain(camera, pools)
         else:
-            self._targets.picture.clear()
+            self._framebuffers.picture.clear()
         self._lay_over(camera, inset)
         if self.brightness < 1.0:
             self._fill(DIM, (0.0, 0.0, 0.0, max(self.brightness, 0.0)))
@@ -180,20 +180,20 @@ class Stage:
         for program in (self._programs.plain, self._programs.textured):
             program["shadow_texel"] = 1.8 * light.texel
         self._maps.key.use(0)
-        self._targets.characters.use()
-        self._targets.characters.clear(viewport=self._seen)
+        self._framebuffers.characters.use()
+        self._framebuffers.characters.clear(viewport=self._seen)
         self._context.enable_direct(CLIP_DISTANCE0)
         for character in self._characters:
             character.draw()
         self._context.disable_direct(CLIP_DISTANCE0)
-        self._targets.resolved.scissor = self._seen
-        self._targets.resolved.use()
-        self._context.copy_framebuffer(self._targets.resolved, self._targets.characters)
+        self._framebuffers.resolved.scissor = self._seen
+        self._framebuffers.resolved.use()
+        self._context.copy_framebuffer(self._framebuffers.resolved, self._framebuffers.characters)
 
     def _draw_floor_and_curtain(self, camera: Camera, pools: NDArray[np.float64]) -> None:
         self._reflected_frame.bind_to_uniform_block(FRAME_BINDING)
-        self._targets.reflection.use()
-        self._targets.reflection.clear()
+        self._framebuffers.reflection.use()
+        self._framebuffers.reflection.clear()
         self._context.enable_direct(CLIP_DISTANCE0)
         for character in self._characters:
             character.draw_reflection()
@@ -202,19 +202,19 @@ class Stage:
         self._context.disable(moderngl.DEPTH_TEST)
         wanted = repr(camera).encode() + pools.tobytes()
         if wanted != self._kept_backdrop:
-            self._targets.backdrop.use()
+            self._framebuffers.backdrop.use()
             self._backdrop_array.render(moderngl.TRIANGLES, vertices=3)
             self._kept_backdrop = wanted
-        self._context.copy_framebuffer(self._targets.picture, self._targets.backdrop)
+        self._context.copy_framebuffer(self._framebuffers.picture, self._framebuffers.backdrop)
         self._floor.draw_mask(self._maps)
-        self._floor.draw(self._targets.picture, self._targets.reflection_image)
+        self._floor.draw(self._framebuffers.picture, self._framebuffers.reflection_image)
 
     def _lay_over(self, camera: Camera, inset: SkeletonInset | None) -> None:
-        picture = self._targets.picture
+        picture = self._framebuffers.picture
         picture.use()
         self._context.enable_only(moderngl.BLEND)
         self._context.blend_func = OVER
-        self._targets.resolved_image.use(0)
+        self._framebuffers.resolved_image.use(0)
         width, height = self.size
         picture.scissor = self._seen
         self._lay_array.render(moderngl.TRIANGLES, vertices=3)
@@ -233,7 +233,7 @@ class Stage:
         self, blend: tuple[int, int], premultiplied: tuple[float, float, float, float]
     ) -> None:
         """Blend one colour into the whole picture."""
-        self._targets.picture.use()
+        self._framebuffers.picture.use()
         self._context.enable_only(moderngl.BLEND)
         self._context.blend_func = blend
         self._fill_program["premultiplied"] = premultiplied
@@ -247,17 +247,17 @@ class Stage:
                 foot = to_clip @ [character.pool[0], 0.0, near, 1.0]
                 at = (foot[:2] / foot[3] * 0.5 + 0.5) * self.size
                 self._caption.draw(
-                    character.caption, (float(at[0]), float(at[1])), self._targets.picture
+                    character.caption, (float(at[0]), float(at[1])), self._framebuffers.picture
                 )
 
     def show(self, target: moderngl.Framebuffer) -> None:
         """Copy the picture to a framebuffer of the same size, such as a window's."""
-        self._context.copy_framebuffer(target, self._targets.picture)
+        self._context.copy_framebuffer(target, self._framebuffers.picture)
 
     def read(self) -> NDArray[np.uint8]:
         """Return the picture (H, W, 4): sRGB with straight alpha, top row first."""
         width, height = self.size
-        data = self._targets.picture.read(components=4, alignment=1)
+        data = self._framebuffers.picture.read(components=4, alignment=1)
         pixels = np.frombuffer(data, dtype=np.uint8).reshape(height, width, 4)[::-1].copy()
         if self._background is None or self._background.alpha == 255:
             pixels[..., 3] = 255
@@ -271,7 +271,7 @@ class Stage:
         """Free all GL objects; the stage cannot be used afterwards."""
         for character in list(self._characters):
             self.remove(character)
-        release_all(self._targets, self._maps, self._floor, self._tubes, self._inset)
+        release_all(self._framebuffers, self._maps, self._floor, self._tubes, self._inset)
         release_all(self._caption, self._backdrop_array, self._backdrop_program)
         release_all(self._lay_array, self._lay_program, self._fill_array, self._fill_program)
         release_all(self._frame, self._reflected_frame)

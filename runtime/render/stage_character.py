@@ -12,14 +12,14 @@ from numpy.typing import ArrayLike, NDArray
 from PIL import Image
 
 from runtime.characters.character import Character, Material
-from runtime.render.programs import release_all
-from runtime.render.smoothing import (
+from runtime.render.normals import (
     DeformingNormals,
     DrawVertices,
     bounding_box,
     is_closed,
     split_vertices,
 )
+from runtime.render.programs import release_all
 from runtime.render.tubes import chain_tubes
 
 SRGB8_ALPHA8 = 0x8C43

@@ -77,7 +77,7 @@ def make_figure(*more: tuple[ArrayLike, ArrayLike], name: str = "figure") -> Cha
             materials=(Material(np.float32([0.6, 0.3, 0.1, 1.0])),),
             face_material=np.zeros(len(faces), dtype=np.int64),
         ),
-        placement=np.eye(4),
+        file_to_stage=np.eye(4),
     )
 
 

@@ -55,9 +55,9 @@ def make_tentacle() -> Character:
     split = place[np.where(across, count + faces // SIDES, faces)]
     colors = np.ones((len(vertex), 4), np.float32)
     colors[:, 0] = vertices[vertex, 1] / HEIGHT
-    placement = np.eye(4)
-    placement[:3, :3] = 0.01 * Rotation.from_euler("x", -90, degrees=True).as_matrix()
-    placement[:3, 3] = (0.0, 0.1, 0.0)
+    file_to_stage = np.eye(4)
+    file_to_stage[:3, :3] = 0.01 * Rotation.from_euler("x", -90, degrees=True).as_matrix()
+    file_to_stage[:3, 3] = (0.0, 0.1, 0.0)
     texture = np.full((2, 2, 4), (255, 128, 0, 255), np.uint8)
     return Character(
         name="tentacle",
@@ -80,7 +80,7 @@ def make_tentacle() -> Character:
             ),
             face_material=(np.arange(len(faces)) % 2).astype(np.int64),
         ),
-        placement=placement,
+        file_to_stage=file_to_stage,
     )
 
 

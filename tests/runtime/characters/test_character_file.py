@@ -115,7 +115,7 @@ def test_real_rigs_keep_their_vertices_joints_and_weights(shared: Path, name: st
     np.testing.assert_allclose(back, model.file_vertices, atol=1e-6 * size)
     assert len(character.vertices) < 0.9 * len(back)  # seams are welded
     np.testing.assert_allclose(character.weights.sum(axis=1), 1.0)
-    matrix = character.placement
+    matrix = character.file_to_stage
     joints = model.skeleton.rest_positions @ matrix[:3, :3].T + matrix[:3, 3]
     np.testing.assert_allclose(character.skeleton.rest_positions, joints)
     surface = character.surface

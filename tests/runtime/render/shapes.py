@@ -47,7 +47,7 @@ def character_of(
         skeleton=Skeleton(("root",), np.array([-1]), np.zeros((1, 3))),
         weights=None,
         surface=surface,
-        placement=np.eye(4),
+        file_to_stage=np.eye(4),
     )
 
 

@@ -38,7 +38,7 @@ def test_the_cache_holds_every_frame_in_the_files_own_coordinates(tmp_path: Path
             cache.write(frame)
     header, samples = read_pc2(tmp_path / "a.pc2")
     assert header == (b"POINTCACHE2\0", 1, 0.0, 1.0)
-    stage = samples @ character.placement[:3, :3].T + character.placement[:3, 3]
+    stage = samples @ character.file_to_stage[:3, :3].T + character.file_to_stage[:3, 3]
     expected = np.stack([frame.vertices[character.surface.vertex] for frame in show])
     np.testing.assert_allclose(stage, expected, atol=1e-6)
 

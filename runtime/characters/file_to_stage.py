@@ -57,7 +57,7 @@ def guess_rotation(
     return rotation, tuple(notes)
 
 
-def placement_matrix(rotation: FloatArray, points: FloatArray) -> FloatArray:
+def file_to_stage_matrix(rotation: FloatArray, points: FloatArray) -> FloatArray:
     """The matrix (4, 4) that turns, scales and moves points (n, 3) to the middle of the stage.
 
     The scale is uniform: the largest that keeps the height within `HEIGHT` and width and depth
@@ -79,6 +79,6 @@ def placement_matrix(rotation: FloatArray, points: FloatArray) -> FloatArray:
 
 
 def placed(matrix: FloatArray, points: FloatArray) -> FloatArray:
-    """Points (n, 3) moved by a placement (4, 4)."""
+    """Points (n, 3) transformed by a matrix (4, 4)."""
     moved: FloatArray = points @ matrix[:3, :3].T + matrix[:3, 3]
     return moved

@@ -7,7 +7,7 @@ import moderngl
 from runtime.render.programs import release_all
 
 
-class Targets:
+class Framebuffers:
     """Framebuffers of one size.
 
     Attributes:

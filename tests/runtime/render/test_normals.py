@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 
 from runtime.characters.character import Character, Surface
-from runtime.render.smoothing import (
+from runtime.render.normals import (
     CREASE,
     DeformingNormals,
     bounding_box,

@@ -11,17 +11,17 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from runtime.characters.builtin import builtin_character
-from runtime.characters.formats.mesh_file import read_mesh_file
-from runtime.characters.placement import (
+from runtime.characters.file_to_stage import (
     ABOUT_FACE,
     HEIGHT,
     UPRIGHT,
     WIDTH,
     Z_UP,
+    file_to_stage_matrix,
     guess_rotation,
     placed,
-    placement_matrix,
 )
+from runtime.characters.formats.mesh_file import read_mesh_file
 
 QUARTER = Rotation.from_euler("y", 90, degrees=True).as_matrix()
 
@@ -37,7 +37,7 @@ def test_a_placement_stands_in_the_middle_and_can_be_undone(seed: int, exponent:
     random = np.random.default_rng(seed)
     points = (random.normal(size=(30, 3)) * random.uniform(0.01, 1, 3) + 5.0) * 10.0**exponent
     rotation = Rotation.random(random_state=seed).as_matrix()
-    matrix = placement_matrix(rotation, points)
+    matrix = file_to_stage_matrix(rotation, points)
     on_stage = placed(matrix, points)
     low, high = on_stage.min(axis=0), on_stage.max(axis=0)
     np.testing.assert_allclose((low + high)[[0, 2]], 0.0, atol=1e-9)
@@ -91,7 +91,7 @@ def test_a_sheet_shows_its_face_upright(thin: int) -> None:
     vertices = np.insert(square, thin, 2.0, axis=1)
     faces = np.array([[0, 1, 2], [0, 2, 3]])
     rotation, notes = guess_rotation(vertices, faces)
-    on_stage = placed(placement_matrix(rotation, vertices), vertices)
+    on_stage = placed(file_to_stage_matrix(rotation, vertices), vertices)
     np.testing.assert_allclose(np.ptp(on_stage, axis=0)[2], 0.0, atol=1e-12)
     assert "flat" in notes[0]
     if thin == 2:  # drawn in xy: as it was drawn
@@ -101,7 +101,7 @@ def test_a_sheet_shows_its_face_upright(thin: int) -> None:
 def test_a_line_of_a_surface_can_be_placed() -> None:
     vertices, faces = np.array([[0.0, 0, 0], [1, 1, 1], [2, 2, 2]]), np.array([[0, 1, 2]])
     rotation, _ = guess_rotation(vertices, faces)
-    assert np.isfinite(placement_matrix(rotation, vertices)).all()
+    assert np.isfinite(file_to_stage_matrix(rotation, vertices)).all()
 
 
 REAL_Z_UP = ["mesh/cgal_man.off", "mesh/cgal_dino.off", "human/anny_thin_male_rest.obj"]
