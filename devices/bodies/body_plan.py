@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
 
@@ -118,7 +119,7 @@ class _Labels:
             return None
         known = [joint for joint in starts[1:3] if joint is not None and self._below(upper, joint)]
         marks = [upper, *known]
-        segments = [self._chain(near, far) for near, far in zip(marks, marks[1:], strict=False)]
+        segments = [self._chain(near, far) for near, far in pairwise(marks)]
         segments = [segment for segment in segments if segment]
         end = self._end(marks[-1], kinds, side)
         if end:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from devices.bodies.body_plan import BodyPlan
 from devices.skeleton import Skeleton
 
 
@@ -59,6 +60,7 @@ class Character:
         surface: for drawing.
         file_to_stage: (4, 4) takes file coordinates to stage coordinates: rotation, uniform scale,
             translation.
+        plan: the parts of its body, of the skeleton's nodes; None where no body is recognised.
         notes: guesses and repairs, one short line each.
     """
 
@@ -69,6 +71,7 @@ class Character:
     weights: csr_array | None
     surface: Surface
     file_to_stage: NDArray[np.float64]
+    plan: BodyPlan | None = None
     notes: tuple[str, ...] = ()
 
     def in_file_coordinates(self, vertices: NDArray[np.float64]) -> NDArray[np.float64]:

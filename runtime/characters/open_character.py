@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
+from devices.bodies.body_plan import plan_by_names
 from devices.errors import InputError
 from runtime.characters.builtin import BUILTIN, builtin_character
 from runtime.characters.character import Character
@@ -30,10 +32,15 @@ def load_character(name: str | Path) -> Character:
         InputError: there is no such file or built-in character, or the file cannot be used.
     """
     if str(name) in BUILTIN:
-        return builtin_character(str(name))
+        return _planned(builtin_character(str(name)))
     if not Path(name).suffix and not Path(name).exists():
         raise InputError(
             f"no character is called {str(name)!r}: give the path of a mesh or rig file, or one of "
             f"{', '.join(BUILTIN)}"
         )
-    return turned_to_best_side(split_parallel_bones(read_character(Path(name))))
+    return _planned(turned_to_best_side(split_parallel_bones(read_character(Path(name)))))
+
+
+def _planned(character: Character) -> Character:
+    """The character with the plan of its body, where one is recognised."""
+    return replace(character, plan=plan_by_names(character.skeleton))
