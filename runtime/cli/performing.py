@@ -12,6 +12,7 @@ from replay.player import Player
 from runtime.characters.open_character import load_character
 from runtime.cli.show_options import show_settings
 from runtime.cli.warm import warm_up
+from runtime.show import messages
 from runtime.show.collector_pauses import collector_paused
 from runtime.show.outputs import check_outputs
 from runtime.show.pacing import AtOnce
@@ -55,8 +56,33 @@ def perform(
 
 def _run(show: Show, stream: SkeletonStream) -> None:
     total = len(stream.recording) if isinstance(stream, Player) and not stream.loop else None
+    told: dict[str, object] = {}
+    _tell_parts(show, told)
     with Progress("performing", total) as progress:
-        show.run(lambda: progress.advance(said=_milliseconds(show.latency)))
+
+        def advance() -> None:
+            _tell_parts(show, told)
+            progress.advance(said=_milliseconds(show.latency))
+
+        show.run(advance)
+
+
+def _tell_parts(show: Show, told: dict[str, object]) -> None:
+    """Say what drives each character, in words, when it begins and when it has changed.
+
+    Args:
+        show: the show.
+        told: the last rest state by what was said of it; those that drive still are not told again.
+    """
+    for act in show.acts:
+        session = act.match_session
+        if all(rest is None or rest in told.values() for rest in session.rests):
+            continue
+        for puppet, parts, rest in zip(act.puppets, session.parts, session.rests, strict=True):
+            line = f"{puppet.character.name}: " + "; ".join(map(str, parts))
+            if parts and rest is not None and line not in told:
+                messages.say(line)
+            told[line] = rest
 
 
 def _milliseconds(seconds: float) -> str:

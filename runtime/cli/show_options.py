@@ -22,6 +22,7 @@ from runtime.cli.arguments import (
 from runtime.conditioning.switches import SWITCHES
 from runtime.render.background import NOTHING, Background
 from runtime.show.settings import (
+    DRIVES,
     ENERGIES,
     CharacterSettings,
     FileSettings,
@@ -98,6 +99,7 @@ def show_settings(options: argparse.Namespace, origin: str) -> ShowSettings:
             mapping=options.mapping,
             extend=options.chains == "extend",
             flip=options.flip,
+            driver=options.drive,
         ),
         characters=tuple(_character(options, number) for number in range(count)),
         conditioning={
@@ -229,6 +231,14 @@ def _add_match(parser: argparse.ArgumentParser) -> None:
         metavar="PRESET|JOINTS",
         help="the part of the performer that drives: whole, upper, arms, legs, left-arm, "
         "right-arm, hand, ... or joint names separated by commas (default whole)",
+    )
+    match.add_argument(
+        "--drive",
+        choices=DRIVES,
+        default="auto",
+        help="how a character follows: absolute points each limb where the performer's points, "
+        "relative turns matched chains from a rest pose, auto (default) is absolute where both "
+        "have such limbs",
     )
     match.add_argument(
         "--performers",

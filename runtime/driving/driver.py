@@ -16,6 +16,9 @@ from runtime.driving.targets import Targets
 
 Array = NDArray[np.float64]
 
+ABSOLUTE, RELATIVE = "absolute", "relative"
+"""The two ways in which a part is driven: see `DrivenPart`."""
+
 
 @dataclass(frozen=True, slots=True)
 class Needs:
@@ -43,6 +46,33 @@ class Highlight:
     joints: tuple[int, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class DrivenPart:
+    """A part of the performer that drives a part of the character.
+
+    Attributes:
+        name: of the performer's part, in words: "left arm".
+        target_name: of the character's part: "left wing".
+        source: joints of the performer, from the trunk outward.
+        target: nodes of the character, from the trunk outward.
+        drive: how: "absolute" points where the performer's part points, "relative" turns from the
+            rest pose as the performer's part turns.
+        gain: share of the performer's motion that is carried over, in (0, 1].
+        flip: whether the turns are mirrored.
+    """
+
+    name: str
+    target_name: str
+    source: tuple[int, ...]
+    target: tuple[int, ...]
+    drive: str
+    gain: float = 1.0
+    flip: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.name} -> {self.target_name}, {self.drive}, {100.0 * self.gain:.0f} %"
+
+
 class Driver(Protocol):
     """Moves one character. Drivers can be switched while a show runs."""
 
@@ -62,6 +92,12 @@ class Driver(Protocol):
     @abstractmethod
     def highlights(self) -> Sequence[Highlight]:
         """The polylines to light up, before the placement, in the order of their colours."""
+        ...
+
+    @property
+    @abstractmethod
+    def parts(self) -> Sequence[DrivenPart]:
+        """What drives what, in words and numbers, for people and for the report."""
         ...
 
     @abstractmethod

@@ -4,15 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from devices.skeleton import Skeleton
-from runtime.characters.character import Character
+from devices.errors import InputError
+from runtime.driving.body_driver import BodyDriver
 from runtime.driving.driver import Driver
+from runtime.driving.pairing import Pairing
 from runtime.driving.polyline_driver import PolylineDriver
-from runtime.puppet.bound_skeleton import BoundSkeleton
-from runtime.puppet.deformable_surface import DeformableSurface
 
-DriverFactory = Callable[[Skeleton, Character, BoundSkeleton, DeformableSurface], Driver]
-"""Makes a driver from the performer's skeleton, a character, its bound skeleton and its surface."""
+DriverFactory = Callable[[Pairing], Driver]
+"""Makes a driver for a performer and a character."""
 
-DRIVERS: Mapping[str, DriverFactory] = {"relative": PolylineDriver}
+
+def best_driver(pairing: Pairing) -> Driver:
+    """Return the driver that suits: limb by limb where both have limbs, else by matched chains.
+
+    A mapping made by hand is followed as it is.
+    """
+    if pairing.by_hand is not None:
+        return PolylineDriver(pairing)
+    try:
+        return BodyDriver(pairing)
+    except InputError:
+        return PolylineDriver(pairing)
+
+
+DRIVERS: Mapping[str, DriverFactory] = {
+    "auto": best_driver,
+    "relative": PolylineDriver,
+    "absolute": BodyDriver,
+}
 """Every driver by its name. A new driver is one more line here."""

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.skeleton import SkeletonFrame
+from runtime.driving.driver import DrivenPart
 from runtime.driving.drivers import DriverFactory
 from runtime.driving.mapping import Mapping
 from runtime.driving.performer import Performer, Pose, Rest, rest_state
@@ -109,6 +110,11 @@ class MatchSession:
     def mappings(self) -> list[Mapping]:
         """For each puppet the mapping that drives it or is shown; without drives if none does."""
         return [match.mapping for match in self._matches]
+
+    @property
+    def parts(self) -> list[Sequence[DrivenPart]]:
+        """For each puppet what drives what, in words and numbers."""
+        return [match.parts for match in self._matches]
 
     @property
     def rests(self) -> list[Rest | None]:

@@ -12,19 +12,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from devices.bodies.body_plan import plan_by_names
 from devices.errors import InputError
-from devices.skeleton import Skeleton
-from runtime.characters.character import Character
 from runtime.driving.driven_chains import DrivenChains
-from runtime.driving.driver import Highlight, MappedDriver, Needs
+from runtime.driving.driver import RELATIVE, DrivenPart, Highlight, MappedDriver, Needs
 from runtime.driving.exaggeration import Exaggeration, ExaggerationState, Strain
 from runtime.driving.limb_release import LimbRelease, LimbReleaseState
 from runtime.driving.mapping import Mapping
+from runtime.driving.pairing import Pairing
+from runtime.driving.part_names import part_name
 from runtime.driving.performer import Pose, Rest
 from runtime.driving.root_motion import RootMotion, chain_length, legs_of, root_motion
 from runtime.driving.targets import HandleTargets, PosedNodes, Targets
-from runtime.puppet.bound_skeleton import BoundSkeleton
-from runtime.puppet.deformable_surface import DeformableSurface
 from solvers.retarget.chain_retargets import ChainRetargets, ChainRetargetsState
 from solvers.retarget.polyline_motion import map_chain
 
@@ -115,10 +114,7 @@ class PolylineDriver(MappedDriver):
     """Moves chains of a character relative to a rest state, as chains of the performer move.
 
     Args:
-        performer: the performer's whole skeleton.
-        character: what is moved.
-        skeleton: the character's bound skeleton.
-        surface: the character's surface, for its elasticity and its edges.
+        pairing: the performer and the character.
 
     Attributes:
         mapping: the mapping that drives, or that is shown.
@@ -129,23 +125,18 @@ class PolylineDriver(MappedDriver):
     needs = Needs()
     poses_nodes = True
 
-    def __init__(
-        self,
-        performer: Skeleton,
-        character: Character,
-        skeleton: BoundSkeleton,
-        surface: DeformableSurface,
-    ) -> None:
+    def __init__(self, pairing: Pairing) -> None:
         self.mapping = Mapping(())
         self.gains = np.ones(0)
         self._view = STRAIGHT_ON
-        self._legs = legs_of(performer)
-        self._character = character
-        self._skeleton = skeleton
-        self._surface = surface
+        self._performer = pairing.performer
+        self._legs = legs_of(pairing.performer)
+        self._character = pairing.character
+        self._skeleton = pairing.skeleton
+        self._surface = pairing.surface
         self._link: _Link | None = None
-        self._positions = skeleton.tree.positions
-        self._weights = skeleton.rest_targets.weights
+        self._positions = pairing.skeleton.tree.positions
+        self._weights = pairing.skeleton.rest_targets.weights
 
     def show(self, mapping: Mapping, view: Array) -> None:
         """Show a mapping without being driven by it: see `MappedDriver.show`."""
@@ -243,6 +234,24 @@ class PolylineDriver(MappedDriver):
         if self._link is None:
             return np.zeros((len(self._surface.edges.ends), 0), dtype=np.bool_)
         return self._link.chains.pulls(self._surface.edges.ends)
+
+    @property
+    def parts(self) -> list[DrivenPart]:
+        """The drives of the mapping, in words."""
+        performer, character = self._performer, self._character
+        gains = self.gains if len(self.gains) else np.ones(len(self.mapping.drives))
+        return [
+            DrivenPart(
+                part_name(performer, plan_by_names(performer), drive.source),
+                part_name(character.skeleton, character.plan, drive.target),
+                drive.source,
+                drive.target,
+                RELATIVE,
+                float(gain),
+                drive.flip,
+            )
+            for drive, gain in zip(self.mapping.drives, gains, strict=True)
+        ]
 
     @property
     def highlights(self) -> list[Highlight]:

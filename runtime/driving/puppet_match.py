@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.errors import InputError
-from runtime.driving.driver import Driver, MappedDriver
+from runtime.driving.driver import DrivenPart, Driver, MappedDriver
 from runtime.driving.drivers import DriverFactory
 from runtime.driving.mapping import Drive, Mapping
+from runtime.driving.pairing import Pairing
 from runtime.driving.performer import Performer, Pose, Rest
 from runtime.driving.polyline_driver import STRAIGHT_ON
 from runtime.driving.turn_limits import box_of, corners_of, limit_turns
@@ -107,6 +108,11 @@ class PuppetMatch:
     def mapping(self) -> Mapping:
         """The mapping that drives the puppet or is shown; one without drives if there is none."""
         return self._driver.mapping if isinstance(self._driver, MappedDriver) else Mapping(())
+
+    @property
+    def parts(self) -> Sequence[DrivenPart]:
+        """What drives what, in words and numbers."""
+        return self._driver.parts
 
     @property
     def needs_clip(self) -> bool:
@@ -231,7 +237,16 @@ class PuppetMatch:
     def _make(self, make_driver: DriverFactory) -> Driver:
         puppet = self.puppet
         skeleton = self._performer.skeleton
-        driver = make_driver(skeleton, puppet.character, puppet.bound_skeleton, puppet.surface)
+        driver = make_driver(
+            Pairing(
+                skeleton,
+                tuple(self._performer.joints),
+                puppet.character,
+                puppet.bound_skeleton,
+                puppet.surface,
+                self._by_hand,
+            )
+        )
         if driver.needs.surface:
             raise InputError(
                 f"the driver of {puppet.character.name} needs a surface of the performer, and this "

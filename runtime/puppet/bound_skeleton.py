@@ -55,6 +55,7 @@ class BoundSkeleton:
         binding: the anchors, and the vertices that they hold.
         handles: the same vertices as handles, one group an anchor.
         rest_targets: the targets of the handles in the rest pose.
+        rest_nodes: the nodes in the rest pose.
         at_rest: all targets of the rest pose.
     """
 
@@ -75,8 +76,8 @@ class BoundSkeleton:
         long = np.linalg.norm(bones, axis=1, keepdims=True)
         self._axes = np.divide(bones, long, out=np.zeros_like(bones), where=long > 0.0)
         self.rest_targets = self._rest_targets()
-        unturned = np.tile(UNTURNED, (len(tree), 1))
-        self.at_rest = Targets(self.rest_targets, nodes=PosedNodes(tree.positions, unturned))
+        self.rest_nodes = PosedNodes(tree.positions, np.tile(UNTURNED, (len(tree), 1)))
+        self.at_rest = Targets(self.rest_targets, nodes=self.rest_nodes)
 
     def _rest_targets(self) -> HandleTargets:
         count = len(self.binding.node)

@@ -130,9 +130,11 @@ class OpenedShow:
         else:
             frames, seconds = len(recording), recording.seconds
         self.report.recorded(frames=frames, joints=len(skeleton.names), seconds=seconds)
-        mappings = [mapping for act in self.acts for mapping in act.match_session.mappings]
-        for part, mapping in zip(self._parts, mappings, strict=True):
-            part.matched(mapping, skeleton)
+        sessions = [act.match_session for act in self.acts]
+        mappings = [mapping for session in sessions for mapping in session.mappings]
+        driven = [parts for session in sessions for parts in session.parts]
+        for part, mapping, parts in zip(self._parts, mappings, driven, strict=True):
+            part.matched(mapping.score, parts, skeleton)
 
     @property
     def _recording(self) -> Recording | None:

@@ -16,6 +16,7 @@ MOST_VOLUME_GAIN = 10.0
 MOST_PORT = 65535
 PORTS = f"0 to {MOST_PORT}"
 MOST_STIFFNESS = 0.99  # with 1 a limb could not bend at all, and the solver would have no answer
+DRIVES = ("auto", "relative", "absolute")
 ENERGIES = ("spokes", "spokes-and-rims", "smooth-rotations")
 
 Address = tuple[str, int | None]
@@ -68,8 +69,9 @@ class MatchSettings:
         mapping: a JSON file that pairs joints and nodes by hand, or None to match.
         extend: drive a matched chain on to its longest leaf, or stop at the root of the sub-tree.
         flip: flip the y-axis of the targets, which mirrors the turns.
-        driver: what turns the performer's poses into the characters': a name in
-            `runtime.driving.drivers.DRIVERS`.
+        driver: how characters follow, a name in `runtime.driving.drivers.DRIVERS`: "absolute"
+            points each limb where the performer's points, "relative" turns matched chains from a
+            rest pose, "auto" is absolute where both bodies have such limbs.
         rehearse: look through a recording for the pose to start from; False matches a recording as
             it matches a live performer.
         patience: [s] that a match must be shown before it performs by itself; 0 at once, infinite
@@ -85,7 +87,7 @@ class MatchSettings:
     mapping: Path | None = None
     extend: bool = True
     flip: bool = False
-    driver: str = "relative"
+    driver: str = "auto"
     rehearse: bool = True
     patience: float | None = None
 

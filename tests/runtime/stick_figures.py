@@ -14,6 +14,7 @@ from devices.skeleton import Skeleton, SkeletonFrame
 from replay.recording import Recording
 from runtime.characters.character import Character, Material, Surface
 from runtime.driving.mapping import Drive, Mapping
+from runtime.driving.pairing import Pairing
 from runtime.driving.performer import Performer, Pose, Rest, rest_state
 from runtime.driving.polyline_driver import PolylineDriver
 from runtime.puppet.puppet import Motion, Puppet
@@ -123,9 +124,15 @@ def seen(positions: NDArray[np.float64]) -> Pose:
     return Performer(BODY).follow(frame(positions))
 
 
+def paired(puppet: Puppet) -> Pairing:
+    """The puppet paired with the performer."""
+    joints = tuple(range(len(BODY.names)))
+    return Pairing(BODY, joints, puppet.character, puppet.bound_skeleton, puppet.surface)
+
+
 def driven_by(puppet: Puppet, drives: Sequence[Drive], rest: Rest) -> PolylineDriver:
     """A new driver of a puppet, which these drives move from this rest state."""
-    driver = PolylineDriver(BODY, puppet.character, puppet.bound_skeleton, puppet.surface)
+    driver = PolylineDriver(paired(puppet))
     driver.show(Mapping(tuple(drives)), FRONT_VIEW)
     driver.prepare((), rest)
     puppet.drive_with(driver)

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Self
 
 from devices.skeleton import Skeleton
 from replay.recorder import Recorder
 from runtime.characters.character import Character
-from runtime.driving.mapping import Mapping, mapping_as_json
+from runtime.driving.driver import DrivenPart
 from runtime.output.files.whole_file import check_writable, whole_file
 from runtime.output.output import PerformedFrame
 from runtime.output.report.stage_times import StageTimes
@@ -38,9 +39,24 @@ class CharacterReport:
         self._watchdog = Watchdog(character.vertices, character.faces)
         self._match: dict[str, Any] = {"score": None, "pairs": []}
 
-    def matched(self, mapping: Mapping, performer: Skeleton) -> None:
-        """Set the match that the character performs with; the last call counts."""
-        self._match = mapping_as_json(mapping, performer)
+    def matched(self, score: float, parts: Sequence[DrivenPart], performer: Skeleton) -> None:
+        """Set what drives the character; the last call counts."""
+        nodes = self._character.skeleton.names
+        self._match = {
+            "score": float(score),
+            "pairs": [
+                {
+                    "name": str(part),
+                    "source": [performer.names[joint] for joint in part.source],
+                    "target": [int(node) for node in part.target],
+                    "target_names": [nodes[node] for node in part.target],
+                    "drive": part.drive,
+                    "gain": float(part.gain),
+                    "flip": part.flip,
+                }
+                for part in parts
+            ],
+        }
 
     def write(self, frame: PerformedFrame) -> None:
         """Count one performed frame."""
@@ -78,7 +94,8 @@ class Report:
 
     The keys are ``frames``, ``dropped``, ``recording`` {frames, joints, seconds}, ``record``
     {frames, lost, fault} of the recording that the show made, or null, ``character`` {vertices,
-    faces, nodes}, ``match`` {score, pairs: [{source: [joint names], target: [node ids], flip}]},
+    faces, nodes}, ``match`` {score, pairs: [{name, source: [joint names], target: [node ids],
+    target_names, drive, gain, flip}]},
     ``stages_ms`` {poll, match, retarget, deform, render, publish, frame, settle, latency: {p50,
     p99, max}}, ``stretch`` {mean, p99}, ``watchdog`` {energy {p50, max}, stretch {p99, max},
     inverted {max, last, longest, frames}}. With several characters ``character``, ``match``,

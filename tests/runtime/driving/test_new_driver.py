@@ -13,13 +13,12 @@ import numpy as np
 import pytest
 
 from devices.errors import InputError
-from devices.skeleton import Skeleton
 from replay.player import EveryFrame, Player
 from replay.recording import Recording
-from runtime.characters.character import Character
-from runtime.driving.driver import Driver, Highlight, Needs
+from runtime.driving.driver import DrivenPart, Driver, Highlight, Needs
 from runtime.driving.drivers import DRIVERS, DriverFactory
 from runtime.driving.match_session import MatchSession
+from runtime.driving.pairing import Pairing
 from runtime.driving.performer import Performer, Pose, Rest
 from runtime.driving.puppet_match import Choices
 from runtime.driving.rehearsal import rehearse
@@ -28,8 +27,6 @@ from runtime.output.files.export import open_export
 from runtime.output.files.point_cache import PointCache
 from runtime.output.files.video import Video
 from runtime.output.report.report import Report
-from runtime.puppet.bound_skeleton import BoundSkeleton
-from runtime.puppet.deformable_surface import DeformableSurface
 from runtime.puppet.puppet import Puppet
 from runtime.show.act_group import Act
 from runtime.show.loop import FrameLoop
@@ -51,16 +48,11 @@ class _New:
     needs = Needs()
     poses_nodes = False
     highlights: Sequence[Highlight] = ()
+    parts: Sequence[DrivenPart] = ()
 
-    def __init__(
-        self,
-        performer: Skeleton,
-        character: Character,
-        skeleton: BoundSkeleton,
-        surface: DeformableSurface,
-    ) -> None:
-        self.hand = performer.index("HandLeft")
-        self.vertices, self.rest_of_surface = character.vertices, surface.rest
+    def __init__(self, pairing: Pairing) -> None:
+        self.hand = pairing.performer.index("HandLeft")
+        self.vertices, self.rest_of_surface = pairing.character.vertices, pairing.surface.rest
         self.rest: Rest | None = None
 
     def prepare(self, clip: Sequence[Pose], rest: Rest | None) -> None:

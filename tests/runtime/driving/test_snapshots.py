@@ -27,6 +27,7 @@ from tests.runtime.stick_figures import (
     driven_by,
     frame,
     make_figure,
+    paired,
     pose,
     waving,
 )
@@ -132,7 +133,7 @@ def test_a_driver_takes_up_the_mapping_and_the_rest_state_of_a_snapshot(
     driver.show(Mapping(LEGS), FRONT_VIEW)
     driver.prepare((), rest_state(moments[3]))
     driver.targets(moments[6])
-    other = PolylineDriver(BODY, FIGURE, puppet.bound_skeleton, puppet.surface)
+    other = PolylineDriver(paired(puppet))
     for each in (driver, other, driver):
         each.restore(state)
         found = each.targets(moments[5])
@@ -160,7 +161,7 @@ def test_another_kind_of_driver_stays_and_begins_anew(figures: list[Puppet]) -> 
             self.resets += 1
             super().reset()
 
-    other = Other(BODY, FIGURE, puppet.bound_skeleton, puppet.surface)
+    other = Other(paired(puppet))
     puppet.drive_with(other)
     puppet.follow(moments[8])
     puppet.deform()

@@ -12,7 +12,7 @@ import pytest
 
 from devices.errors import InputError
 from devices.skeleton import Skeleton
-from runtime.driving.mapping import Drive, Mapping
+from runtime.driving.driver import RELATIVE, DrivenPart
 from runtime.output.report.report import Report
 from tests.runtime.tentacle import NODES, make_show, make_tentacle
 
@@ -28,8 +28,9 @@ def test_the_report_has_the_keys_that_others_read(tmp_path: Path) -> None:
     with Report(tmp_path / "r.json") as report:
         report.recorded(frames=np.int64(9), joints=25, seconds=np.float32(0.5))
         part = report.add_character(character)
-        drive = Drive((0, 1), tuple(np.arange(3)), flip=True)
-        part.matched(Mapping((drive,), score=np.float32(0.75)), LEG)
+        target = tuple(np.arange(3))
+        knee = DrivenPart("left leg", "tentacle", (0, 1), target, RELATIVE, 0.5, flip=True)
+        part.matched(np.float32(0.75), [knee], LEG)
         for frame in make_show(character, frames=7):
             part.write(frame)
             report.times.add("deform", 0.002)
@@ -59,7 +60,17 @@ def test_the_report_has_the_keys_that_others_read(tmp_path: Path) -> None:
         },
         "match": {
             "score": 0.75,
-            "pairs": [{"source": ["Hip", "Knee"], "target": [0, 1, 2], "flip": True}],
+            "pairs": [
+                {
+                    "name": "left leg -> tentacle, relative, 50 %",
+                    "source": ["Hip", "Knee"],
+                    "target": [0, 1, 2],
+                    "target_names": list(character.skeleton.names[:3]),
+                    "drive": "relative",
+                    "gain": 0.5,
+                    "flip": True,
+                }
+            ],
         },
     }
 
@@ -69,7 +80,7 @@ def test_several_characters_are_listed_beside_the_first(tmp_path: Path) -> None:
     with Report(tmp_path / "r.json") as report:
         first = report.add_character(character)
         second = report.add_character(replace(character, name="other"))
-        second.matched(Mapping(()), LEG)
+        second.matched(float("nan"), [], LEG)
         for frame in make_show(character, frames=3):
             first.write(frame)
             second.write(replace(frame, vertices=character.vertices))
@@ -85,7 +96,7 @@ def test_several_characters_are_listed_beside_the_first(tmp_path: Path) -> None:
 def test_numbers_that_json_cannot_hold_become_null(tmp_path: Path) -> None:
     with Report(tmp_path / "r.json") as report:
         report.recorded(frames=1, joints=2, seconds=float("nan"))
-        report.add_character(make_tentacle()).matched(Mapping((), score=float("-inf")), LEG)
+        report.add_character(make_tentacle()).matched(float("-inf"), [], LEG)
     written = json.loads((tmp_path / "r.json").read_text(), parse_constant=refuse)
     assert written["recording"]["seconds"] is None
     assert written["match"]["score"] is None
@@ -95,7 +106,7 @@ def test_names_of_any_kind_can_be_written(tmp_path: Path) -> None:
     with Report(tmp_path / "r.json") as report:
         part = report.add_character(make_tentacle())
         names = ('"é\n', "\udc80")
-        part.matched(Mapping((Drive((0, 1), (0, 1)),)), replace(LEG, names=names))
+        part.matched(1.0, [DrivenPart("", "", (0, 1), (0, 1), RELATIVE)], replace(LEG, names=names))
     pairs = json.loads((tmp_path / "r.json").read_bytes())["match"]["pairs"]
     assert pairs[0]["source"] == ['"é\n', "\udc80"]
 

@@ -1,0 +1,217 @@
+"""The driver that moves a body limb by limb: each points where the performer's points."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from devices.bodies.body_plan import SIDES, BodyPlan, plan_by_names
+from devices.errors import InputError
+from devices.skeleton import Skeleton
+from runtime.driving.body_parts import BodyParts, body_parts
+from runtime.driving.driver import DrivenPart, Highlight, Needs
+from runtime.driving.pairing import Pairing
+from runtime.driving.part_names import part_name
+from runtime.driving.performer import Pose, Rest
+from runtime.driving.targets import HandleTargets, Placement, PosedNodes, Targets
+from runtime.puppet.bound_skeleton import Anchors
+from solvers.retarget.heading import heading, turned
+from solvers.retarget.limb_posing import pose_limbs
+from solvers.retarget.trunk_turns import UPRIGHT, orientations, trunk_turns
+
+Array = NDArray[np.float64]
+
+_STANDING = np.cos(np.radians(25.0))  # of the trunk of a rest pose that is upright
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class BodyState:
+    """The state of a `BodyDriver` between two frames.
+
+    Attributes:
+        rest: the performer's rest state; None while nothing drives.
+        origin: (2,) [m] where the performer's hips were when the character began to travel.
+        trunk: (3, 4) the last turns of pelvis, chest and head.
+        twists: (S,) [rad] of the forearms.
+        nodes: the posed nodes.
+    """
+
+    rest: Rest | None
+    origin: Array
+    trunk: Array
+    twists: Array
+    nodes: PosedNodes
+
+
+class BodyDriver:
+    """Moves the parts of a body as the same parts of the performer move.
+
+    Args:
+        pairing: the performer and the character.
+
+    Raises:
+        InputError: performer and character have no part in common.
+    """
+
+    needs = Needs()
+    poses_nodes = True
+
+    def __init__(self, pairing: Pairing) -> None:
+        performer, character, skeleton = pairing.performer, pairing.character, pairing.skeleton
+        plan, source = character.plan, plan_by_names(performer)
+        if plan is None or source is None:
+            who = character.name if plan is None else "the performer"
+            raise InputError(f"{who} has no limbs that are known: use --drive relative")
+        self._facing = facing_of(character.skeleton, plan)
+        upright = turned(
+            performer.rest_positions, self._facing - facing_of(performer, source), np.zeros(3)
+        )
+        parts = body_parts(
+            performer,
+            pairing.joints,
+            upright,
+            skeleton.tree.rerooted(plan.hips),
+            plan,
+            source,
+        )
+        if parts is None:
+            raise InputError(f"{character.name} has no part that the performer has too")
+        self._parts: BodyParts = parts
+        self._skeleton = skeleton
+        self._character = character
+        self._upright = self._neutral(upright)
+        self._rest: Rest | None = None
+        self._ratio = self._size_ratio(upright)
+        self._hips = plan.hips
+        self._turn_of_anchor, self._pivots = self._anchors()
+        self._origin: Array | None = None
+        self._trunk = UPRIGHT
+        self._twists = np.zeros(len(parts.rig.near))
+        self._nodes = skeleton.rest_nodes
+
+    def _neutral(self, upright: Array) -> Array:
+        """The orientations (3, 4) of the performer's trunk while it stands upright."""
+        joints = self._parts.trunk
+        own = orientations(upright, joints)
+        ideal = np.tile([0.0, np.sin(0.5 * self._facing), 0.0, np.cos(0.5 * self._facing)], (3, 1))
+        head = own[2].copy()
+        for part in range(3):
+            x, _, z, _ = own[part]
+            if part < 2 and 1.0 - 2.0 * (x * x + z * z) < _STANDING:
+                own[part] = ideal[part]
+        if joints.face[2] < 0 and joints.head >= 0 and head[1] < _STANDING:
+            own[2] = (0.0, 1.0, 0.0, 0.0)
+        return own
+
+    def _size_ratio(self, upright: Array) -> float:
+        """How long the character's legs are for each metre of the performer's."""
+        nodes = self._skeleton.tree.positions
+        theirs = ours = 0.0
+        for source, target in self._parts.legs:
+            theirs += float(np.linalg.norm(np.diff(upright[list(source)], axis=0), axis=1).sum())
+            ours += float(np.linalg.norm(np.diff(nodes[list(target)], axis=0), axis=1).sum())
+        if theirs > 0.0:
+            return ours / theirs
+        return float(np.ptp(nodes[:, 1])) / max(float(np.ptp(upright[:, 1])), 1e-9)
+
+    def _anchors(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """For each anchor the node that turns it, and the node about which it turns."""
+        binding, parents = self._skeleton.binding, self._parts.rig.parents
+        upper = np.where(parents[binding.node] == binding.pivot, binding.pivot, binding.node)
+        return upper, binding.pivot
+
+    def prepare(self, clip: Sequence[Pose], rest: Rest | None) -> None:
+        """Start to drive from this rest state: see `Driver.prepare`."""
+        self._rest = rest
+        self._origin = clip[0].hips[[0, 2]] if clip else None
+        self.reset()
+
+    def targets(self, pose: Pose) -> Targets:
+        """Return the targets for a pose; those of the rest pose while nothing drives."""
+        rest, rig = self._rest, self._parts.rig
+        if rest is None:
+            return self._skeleton.at_rest
+        joints = pose.facing(self._facing)
+        self._trunk = trunk_turns(joints, self._parts.trunk, self._upright, self._trunk)
+        rotations, positions = np.empty((len(rig.order), 4)), np.empty((len(rig.order), 3))
+        given = np.zeros((len(rig.near), 4))
+        pose_limbs(rig, joints, self._trunk, given, self._twists, rotations, positions)
+        self._nodes = PosedNodes(positions, rotations)
+        anchors = Anchors(
+            rotations[self._turn_of_anchor],
+            positions[self._pivots],
+            np.ones(len(self._pivots)),
+            np.eye(3),
+        )
+        handles = HandleTargets(
+            self._skeleton.handles,
+            self._skeleton.handle_positions(anchors, 0.5),
+            self._skeleton.rest_targets.weights,
+        )
+        return Targets(handles, self._placement(pose, rest), self._nodes)
+
+    def _placement(self, pose: Pose, rest: Rest) -> Placement:
+        """Where the whole goes: the hips travel as the performer's, in lengths of the legs."""
+        if self._origin is None:
+            self._origin = pose.hips[[0, 2]]
+        turn = pose.heading - rest.heading
+        x, z = self._ratio * (pose.hips[[0, 2]] - self._origin)
+        way = turned(np.array([[x, 0.0, z]]), self._facing - rest.heading, np.zeros(3))[0]
+        about = self._skeleton.tree.positions[self._skeleton.root]
+        hips = self._parts.rig.rest[self._hips]
+        back = hips - turned(hips[None], turn, about)[0]
+        travel = (float(way[0] + back[0]), float(way[2] + back[2]))
+        return Placement(turn, travel, lift=-1e3)
+
+    def reset(self) -> None:
+        """Forget the poses before: see `Driver.reset`."""
+        self._trunk = UPRIGHT
+        self._twists = np.zeros(len(self._parts.rig.near))
+        self._nodes = self._skeleton.rest_nodes
+
+    @property
+    def parts(self) -> list[DrivenPart]:
+        """The parts that drive, in words."""
+        skeleton, plan = self._character.skeleton, self._character.plan
+        return [
+            DrivenPart(
+                part.name,
+                part_name(skeleton, plan, part.target),
+                part.source,
+                part.target,
+                part.drive,
+            )
+            for part in self._parts.parts
+        ]
+
+    @property
+    def highlights(self) -> list[Highlight]:
+        """The driven parts; each lights up with the joints that drive it."""
+        return [
+            Highlight(self._nodes.positions[list(part.target)], part.source[1:])
+            for part in self._parts.parts
+        ]
+
+    def snapshot(self) -> BodyState:
+        """Return what is remembered: see `Driver.snapshot`."""
+        origin = np.full(2, np.nan) if self._origin is None else self._origin
+        return BodyState(self._rest, origin, self._trunk, self._twists.copy(), self._nodes)
+
+    def restore(self, state: BodyState) -> None:
+        """Go back to a snapshot."""
+        self._rest, self._trunk, self._nodes = state.rest, state.trunk, state.nodes
+        self._origin = None if np.isnan(state.origin).any() else state.origin
+        self._twists = state.twists.copy()
+
+
+def facing_of(skeleton: Skeleton, plan: BodyPlan) -> float:
+    """Return the heading [rad] of a body at rest, from +Z towards its left."""
+    pairs = [
+        [limbs[side].upper[0] for side in SIDES]
+        for limbs in (plan.legs, plan.arms)
+        if len(limbs) == len(SIDES)
+    ]
+    return heading(skeleton.rest_positions.copy(), np.array(pairs, dtype=np.int64).reshape(-1, 2))
