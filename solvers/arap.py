@@ -5,11 +5,10 @@ geometric model for elastic deformations, for the energy with rims. The solver a
 
 - A start near the answer. The last answer first moves along with the handles
   (`solvers.deform.handle_motion`), so a rigid motion of all handles needs no iteration. After a
-  jump the solver also tries the rest pose, moved along, and takes it if its energy is lower. So a
-  bad frame has no effect on later frames (`solvers.deform.rest_pose_trials`).
-- A correction as the unknown. The global step solves for the correction of the positions, from a
-  residual in double precision. The error of the solve is relative to the correction, not to the
-  size of the character.
+  jump the solver also tries the rest pose (`solvers.deform.rest_pose_trials`), so a bad frame has
+  no effect on later frames. Or the caller knows a start, such as a skinned surface: `relax`.
+- A correction as the unknown, from a residual in double precision: the error of the solve is
+  relative to the correction, not to the size of the character.
 - Optional terms between rotations: smooth rotations for few handles, and stiff limbs
   (`solvers.deform.rotation_priors`).
 - Parts without a handle. The nearest group of handles carries such a component, or a vertex without
@@ -21,10 +20,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solvers.deform.arap_cells import SPOKES, SPOKES_AND_RIMS, build_cells
+from solvers.deform.arap_cells import SPOKES, SPOKES_AND_RIMS, build_cells, surface_area
 from solvers.deform.arap_kernels import energy_terms, fit_cells, place_outside, pull_soft, residual
 from solvers.deform.arap_layout import (
     UnitBox,
+    check_steps,
     checked_mesh,
     checked_regions,
     checked_targets,
@@ -38,6 +38,7 @@ from solvers.deform.handles import checked_handles
 from solvers.deform.rest_pose_trials import RestPoseTrials
 from solvers.deform.rotation_fit import SCRATCH
 from solvers.deform.rotation_priors import (
+    NO_PRIORS,
     SMOOTHNESS,
     RotationPriors,
     fit_cells_near,
@@ -46,7 +47,7 @@ from solvers.deform.rotation_priors import (
 from solvers.deform.solver_state import DeformationState
 from solvers.kernels.compiled import most_threads, threads_for
 from solvers.linear.constrained_system import ConstrainedSystem, Constraints
-from solvers.linear.laplacian import Floats, Ints
+from solvers.linear.laplacian import Floats
 
 SMOOTH_ROTATIONS = "smooth-rotations"
 ENERGIES = (SPOKES, SPOKES_AND_RIMS, SMOOTH_ROTATIONS)
@@ -96,15 +97,14 @@ class ArapSolver:
         self._system = ConstrainedSystem(self._mesh.laplacian, layout.tree, self._constraints())
         self._influence = HandleInfluence(self._system, self._handles)
         count = len(points)
-        smoothing = SMOOTHNESS * _area(self._rest, layout.faces)
+        smoothing = SMOOTHNESS * surface_area(self._rest, layout.faces)
         self._priors = RotationPriors(
             self._mesh, self._rest, smoothing if energy == SMOOTH_ROTATIONS else 0.0
         )
         self._R = np.tile(_NO_TURN, (count, 1))
         self._R_aside = self._R.copy()
         self._trials = RestPoseTrials()
-        self._laplace_x = np.empty((count, 3))
-        self._residual = np.empty((count, 3))
+        self._laplace_x, self._residual = np.empty((count, 3)), np.empty((count, 3))
         self._room = np.empty((most_threads(), SCRATCH))
         self._x = self._rest.copy()
         self._shown = self._x
@@ -186,15 +186,11 @@ class ArapSolver:
 
     def snapshot(self) -> DeformationState:
         """Return what the next solve depends on, besides the settings: see `DeformationState`."""
+        x, R, precision = self._x.copy(), self._R.copy(), self._system.precision
+        influence = self._influence.snapshot()
+        creases = None if self._creases is None else self._creases.snapshot()
         return DeformationState(
-            self._x.copy(),
-            self._R.copy(),
-            self._handles,
-            self._goals,
-            self._system.precision,
-            self._influence.snapshot(),
-            self._trials,
-            None if self._creases is None else self._creases.snapshot(),
+            x, R, self._handles, self._goals, precision, influence, self._trials, creases
         )
 
     def restore(self, state: DeformationState) -> None:
@@ -218,9 +214,8 @@ class ArapSolver:
         self._x[:], self._R[:], self._goals = state.positions, state.rotations, state.goals
         self._shown = self._x
         self._trials = state.trials
-        if state.creases is None:
-            self._creases = None
-        else:
+        self._creases = None
+        if state.creases is not None:
             self._made_creases().restore(state.creases)
 
     def solve(
@@ -236,19 +231,42 @@ class ArapSolver:
             ValueError: for targets of a wrong shape, not finite, or absurdly far away.
         """
         goals = checked_targets(targets, len(self._handles.places), self._box)
-        if iterations < 0:
-            raise ValueError(f"iterations must not be negative, got {iterations}")
-        answer = np.empty_like(self._x) if out is None else out
+        check_steps(iterations)
         with threads_for(len(self._x)):
             self._move_along(self._box.inside(goals))
-            for _ in range(iterations):
-                self._local_step(self._x)
-                self._global_step()
-            self._shown = self._pose_step() if iterations else self._x
-            box, order = self._box, self._layout.order
-            place_outside(self._shown, order, box.centre, box.size, answer)
+            answer = self._stepped(iterations, out)
         hard = self._handles.hard
         answer[self._layout.order[self._handles.places[hard]]] = goals[hard]
+        return answer
+
+    def relax(
+        self, targets: ArrayLike, iterations: int = 1, *, out: Floats | None = None
+    ) -> Floats:
+        """Return vertices (N, 3) near `targets` (N, 3) that have less energy than these.
+
+        Every vertex must be a soft handle. The solver starts at the targets themselves, so no
+        earlier answer matters. `iterations` and `out` as of `solve`.
+
+        Raises:
+            ValueError: as of `solve`, and where some vertex is no soft handle.
+        """
+        goals = checked_targets(targets, len(self._x), self._box)
+        check_steps(iterations)
+        if not self._handles.are_soft_everywhere(len(self._x)):
+            raise ValueError("expected every vertex to be a soft handle: hold all of them first")
+        with threads_for(len(self._x)):
+            self._x[self._handles.places] = self._goals = self._box.inside(goals)
+            self._trials = self._trials.after_solve()
+            if self._priors.is_on:  # they depend on each other's rotations
+                self._fit(self._x, NO_PRIORS)
+            return self._stepped(iterations, out)
+
+    def _stepped(self, iterations: int, out: Floats | None) -> Floats:
+        """Take iterations from x, and return the surface to show (N, 3), outside the box."""
+        answer = np.empty_like(self._x) if out is None else out
+        self._step(iterations)
+        self._shown = self._pose_step() if iterations else self._x
+        place_outside(self._shown, self._layout.order, self._box.centre, self._box.size, answer)
         return answer
 
     def settle(self, iterations: int = 1) -> None:
@@ -261,9 +279,7 @@ class ArapSolver:
             share = self._trials.share_between_frames()
             if share is not None:
                 self._try_from_rest(self._goals, share)
-            for _ in range(iterations):
-                self._local_step(self._x)
-                self._global_step()
+            self._step(iterations)
 
     @property
     def energy(self) -> float:
@@ -297,6 +313,11 @@ class ArapSolver:
     def rotations(self) -> Floats:
         """Return the rotation of each vertex's cell after the last iteration, (N, 3, 3)."""
         return self._R[self._layout.place].reshape(-1, 3, 3)
+
+    def _step(self, iterations: int) -> None:
+        for _ in range(iterations):
+            self._local_step(self._x)
+            self._global_step()
 
     def _local_step(self, x: Floats) -> None:
         priors = self._priors.find(self._R)
@@ -377,8 +398,3 @@ class ArapSolver:
 
     def _constraints(self) -> Constraints:
         return self._carried.constraints(self._handles, len(self._rest), self._unit)
-
-
-def _area(points: Floats, faces: Ints) -> float:
-    a, b, c = (points[faces[:, corner]] for corner in range(3))
-    return 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import scipy.sparse as sp
 from numba.core import event
+from numpy.typing import NDArray
 
 from devices.bridge.messages import LATEST
 from devices.bridge.receiver import BridgeReceiver
@@ -31,10 +32,12 @@ from runtime.show.progress import Progress
 from runtime.show.settings import CharacterSettings, ShowSettings
 from runtime.show.show import Show
 from solvers.arap import ENERGIES
+from solvers.deform.skinning import SkinnedSurface
 from solvers.kernels.cache import count_compiled, has_list, remove_unused, save_list
 from solvers.linear.block_factor import BlockFactor
 from solvers.linear.nested_dissection import dissect
 from solvers.squash_stretch import SquashStretchSolver
+from solvers.surface.heat_weights import skin_of_heat
 
 # What the two lists are of; after a change in this module they are made again.
 _THIS = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:8]
@@ -131,6 +134,14 @@ def use_solvers() -> None:
         solver.solve(x[corners[:3]], 1)
         solver.restore(before)
     _factor_in_double()
+    _skin(x, faces)
+
+
+def _skin(points: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
+    """Let a surface follow two nodes by a skin found for it."""
+    nodes = points[[0, len(points) // 2, -1]]
+    skin = skin_of_heat(points, faces, np.array([-1, 0, 1]), nodes)
+    SkinnedSurface(points, nodes, skin).place(nodes, np.tile([0.0, 0.0, 0.0, 1.0], (3, 1)))
 
 
 def _factor_in_double() -> None:

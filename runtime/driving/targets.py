@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
+SKIN_FIRMNESS = 0.05  # measured: docs/deformation.md
+
 
 @dataclass(frozen=True, slots=True)
 class Placement:
@@ -67,6 +69,20 @@ class HandleTargets:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class SkinnedTargets:
+    """Where a skin puts every vertex; the solver starts there, and makes the surface even.
+
+    Attributes:
+        positions: (C, 3) [m] of the deformed surface (`DeformableSurface.rest`).
+        firmness: how firmly each vertex is held there, above 0: see `ArapSolver.hold`. Another
+            firmness than in the frame before costs a few milliseconds.
+    """
+
+    positions: Array
+    firmness: float = SKIN_FIRMNESS
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class PosedNodes:
     """The K nodes of a character's skeleton at one moment.
 
@@ -84,12 +100,12 @@ class Targets:
     """What a driver asks of a character for one frame. Nobody writes to its arrays.
 
     Attributes:
-        shape: targets of handles, or the finished surface: (N, 3) [m] all vertices of the
-            character, which the solver then leaves as they are. Before the placement.
+        shape: targets of handles, or of a skin, or the finished surface: (N, 3) [m] all vertices
+            of the character, which the solver then leaves as they are. Before the placement.
         placement: where the whole character is.
         nodes: the posed nodes, before the placement; None if the driver poses none.
     """
 
-    shape: HandleTargets | Array
+    shape: HandleTargets | SkinnedTargets | Array
     placement: Placement = field(default_factory=Placement)
     nodes: PosedNodes | None = None

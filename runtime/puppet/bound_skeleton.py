@@ -3,18 +3,28 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from runtime.characters.character import Character
 from runtime.characters.proxy import Proxy
-from runtime.driving.targets import HandleGroups, HandleTargets, PosedNodes, Targets
+from runtime.driving.targets import (
+    HandleGroups,
+    HandleTargets,
+    PosedNodes,
+    SkinnedTargets,
+    Targets,
+)
 from solvers.deform.handles import HARD, group_targets, stretched_turns
+from solvers.deform.skinning import SkinnedSurface
 from solvers.deform.stiff_segments import StiffSegments, find_stiff_segments
 from solvers.retarget.abstraction import abstract
 from solvers.skeleton.anchors import bind
 from solvers.skeleton.tree import Tree
+from solvers.surface.heat_weights import skin_of_heat
+from solvers.surface.skin_weights import Skin, skin_of_weights
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -64,7 +74,7 @@ class BoundSkeleton:
         tree = Tree(skeleton.parents, skeleton.rest_positions)
         self.root = abstract(tree).root
         self.tree = tree = tree.rerooted(self.root)
-        self._proxy = proxy
+        self._character, self._proxy = character, proxy
         self._bone_of_vertex = _bones_of_weights(character, proxy.kept, tree.parents)
         self.binding = binding = bind(
             proxy.vertices, proxy.faces, tree.parents, tree.positions, self._bone_of_vertex
@@ -101,6 +111,27 @@ class BoundSkeleton:
         """
         maps = stretched_turns(anchors.turns, self._axes, anchors.lengths, thinning, anchors.whole)
         return group_targets(self._offsets, self.binding.anchor, maps, anchors.pivots)
+
+    @cached_property
+    def skin(self) -> Skin:
+        """The nodes that each vertex of the deformed surface follows, and their weights.
+
+        A node carries what lies beyond it, as the character's own skeleton is rooted. Found when
+        it is first asked for, which takes up to a second without weights from a file.
+        """
+        character, proxy = self._character, self._proxy
+        if character.weights is not None:
+            return skin_of_weights(character.weights[proxy.kept])
+        skeleton = character.skeleton
+        return skin_of_heat(proxy.vertices, proxy.faces, skeleton.parents, skeleton.rest_positions)
+
+    @cached_property
+    def _skinned_surface(self) -> SkinnedSurface:
+        return SkinnedSurface(self._proxy.vertices, self.tree.positions, self.skin)
+
+    def skinned(self, nodes: PosedNodes) -> SkinnedTargets:
+        """Return the targets of the surface that follows the posed nodes by its skin."""
+        return SkinnedTargets(self._skinned_surface.place(nodes.positions, nodes.rotations))
 
     def limb(self, chain: tuple[int, ...]) -> tuple[int, ...]:
         """Return the part of a chain of nodes that lies outside the trunk, two nodes at least."""

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from runtime.characters.proxy import Proxy
-from runtime.driving.targets import HandleGroups, HandleTargets
+from runtime.driving.targets import SKIN_FIRMNESS, HandleGroups, HandleTargets, SkinnedTargets
 from solvers.deform.arap_cells import SPOKES
 from solvers.deform.handles import HARD
 from solvers.deform.solver_state import DeformationState
@@ -93,6 +93,9 @@ class DeformableSurface:
         self._handles = handles
         self._weights = np.full(len(handles.vertices), HARD)  # of each handle
         self._asked: Array | None = None  # the weights of the last targets
+        every = np.arange(len(self.rest))
+        self._every_vertex = HandleGroups(every, np.zeros_like(every))
+        self._firmness = np.array([SKIN_FIRMNESS])  # of the last targets of a skin
         self._stiff_segments = stiff_segments
         self._is_segmented = False
         self._answer = np.empty_like(self.rest)
@@ -127,11 +130,14 @@ class DeformableSurface:
         self._solver.restore(state.solver)
         self._handles, self._weights, self._asked = state.handles, state.weights, None
 
-    def deform(self, targets: HandleTargets, iterations: int) -> Array:
-        """Return the deformed surface (C, 3) [m], from the last answer on.
+    def deform(self, targets: HandleTargets | SkinnedTargets, iterations: int) -> Array:
+        """Return the deformed surface (C, 3) [m]; the next call overwrites it.
 
-        The next call overwrites it.
+        With targets of handles it goes on from the last answer, with those of a skin from these.
         """
+        if isinstance(targets, SkinnedTargets):
+            self.hold(self._held_by_skin(targets))
+            return self._solver.relax(targets.positions, iterations, out=self._answer)
         self.hold(targets)
         self._solver.solve(targets.positions, iterations, out=self._answer)
         self._solver.flatten_folds(self._answer)
@@ -148,6 +154,12 @@ class DeformableSurface:
         elif not np.array_equal(weights, self._weights):
             self._solver.weigh(weights)
         self._handles, self._weights, self._asked = handles, weights, targets.weights
+
+    def _held_by_skin(self, targets: SkinnedTargets) -> HandleTargets:
+        """The targets of a skin, as those of one soft handle at each vertex."""
+        if self._firmness[0] != targets.firmness:
+            self._firmness = np.array([targets.firmness])
+        return HandleTargets(self._every_vertex, targets.positions, self._firmness)
 
     @property
     def stretch(self) -> Array:

@@ -12,7 +12,7 @@ from runtime.characters.character import Character
 from runtime.characters.proxy import proxy_of
 from runtime.driving.driver import Driver, Highlight
 from runtime.driving.performer import Pose
-from runtime.driving.targets import HandleTargets, PosedNodes, Targets
+from runtime.driving.targets import HandleTargets, PosedNodes, SkinnedTargets, Targets
 from runtime.puppet.bound_skeleton import BoundSkeleton
 from runtime.puppet.deformable_surface import DeformableSurface, SurfaceState
 from runtime.puppet.placement import Stance, put_on_stage
@@ -61,7 +61,7 @@ class Puppet:
     Args:
         character: what is moved.
         iterations: of the solver, a frame. Where there are several, the last one comes after the
-            surface is shown: see `settle`.
+            surface is shown: see `settle`. Targets of a skin need one less, since they are nearer.
         energy: what is kept as rigid as possible: see `ArapSolver`.
 
     Attributes:
@@ -171,8 +171,10 @@ class Puppet:
         nodes = None if targets.nodes is None else self._stance.place_nodes(targets.nodes)
         return Motion(standing, nodes)
 
-    def _vertices(self, shape: HandleTargets | Array, iterations: int) -> Array:
+    def _vertices(self, shape: HandleTargets | SkinnedTargets | Array, iterations: int) -> Array:
         """The character's vertices (N, 3) [m] before the placement."""
+        if isinstance(shape, SkinnedTargets):  # no more steps after a jump than in a show
+            return self.surface.cover(self.surface.deform(shape, self._before_shown))
         if isinstance(shape, HandleTargets):
             return self.surface.cover(self.surface.deform(shape, iterations))
         if shape.shape != self.character.vertices.shape:

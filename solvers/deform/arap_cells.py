@@ -135,3 +135,9 @@ def _lay_out(vertices: Floats, edges: WeightedEdges, terms: Terms, *, sharing: i
         own=own,
     )
     return CellMesh(half_edges, terms, graph_laplacian(edges, count), sharing)
+
+
+def surface_area(points: Floats, faces: Ints) -> float:
+    """Return the area of a surface of triangles (F, 3) between points (N, 3)."""
+    a, b, c = (points[faces[:, corner]] for corner in range(3))
+    return 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())

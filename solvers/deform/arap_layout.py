@@ -97,6 +97,12 @@ def checked_targets(targets: ArrayLike, count: int, box: UnitBox) -> Floats:
     return points
 
 
+def check_steps(iterations: int) -> None:
+    """Raise a ValueError for a number of iterations below zero."""
+    if iterations < 0:
+        raise ValueError(f"iterations must not be negative, got {iterations}")
+
+
 @kernel
 def _first_beyond(points: Floats, centre: Floats, most: float) -> int:
     """The index of the first point farther than `most` from the centre on some axis, or -1."""

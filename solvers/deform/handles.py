@@ -41,6 +41,10 @@ class Handles:
         """(H,) bool: the handles whose targets are met exactly."""
         return np.isinf(self.weights)
 
+    def are_soft_everywhere(self, count: int) -> bool:
+        """Whether each of `count` vertices is a handle, and none is met exactly."""
+        return len(self.places) == count and not self.hard.any()
+
     def reweighted(self, weights: ArrayLike) -> Handles:
         """The same handles with other weights (H,)."""
         return Handles(self.places, self.group_of, self.count, _checked_weights(weights, self))
