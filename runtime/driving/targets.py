@@ -21,11 +21,14 @@ class Placement:
         turn: [rad] about the vertical through the root node.
         travel: [m] along x and z, after the turn.
         lift: [m] along y. Contact with the floor may lift the character further.
+        clearance: [m] of the character's lowest vertex above the floor, whatever the lift; None
+            for the lift.
     """
 
     turn: float = 0.0
     travel: tuple[float, float] = (0.0, 0.0)
     lift: float = 0.0
+    clearance: float | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from runtime.driving.targets import Placement, PosedNodes
-from solvers.retarget.ground_contact import place_on_floor, turned_rotations
+from solvers.retarget.ground_contact import place_above_floor, place_on_floor, turned_rotations
 from solvers.retarget.heading import turned
 
 Array = NDArray[np.float64]
@@ -41,6 +41,9 @@ class Stance:
 def put_on_stage(vertices: Array, placement: Placement, about: Array, out: Array) -> Stance:
     """Put vertices (N, 3) [m] on the stage, into `out` (N, 3); nothing sinks into the floor.
 
+    With a clearance, the lowest vertex stands that high above the floor: who stands stays on the
+    floor while the legs bend. Else the character is lifted, by the floor where it must be.
+
     Args:
         vertices: of the character, before the placement.
         placement: where the whole character is.
@@ -48,7 +51,10 @@ def put_on_stage(vertices: Array, placement: Placement, about: Array, out: Array
         out: where they are put; not `vertices` itself.
     """
     x, z = placement.travel
-    rise = place_on_floor(vertices, placement.turn, about, placement.lift, out)
+    if placement.clearance is None:
+        rise = place_on_floor(vertices, placement.turn, about, placement.lift, out)
+    else:
+        rise = place_above_floor(vertices, placement.turn, about, placement.clearance, out)
     if x != 0.0 or z != 0.0:
         out += (x, 0.0, z)
     return Stance(placement.turn, about, np.array([x, rise, z]))

@@ -1,4 +1,4 @@
-"""Turns a whole character about the vertical and keeps it above the floor."""
+"""Turns a whole character about the vertical, and puts it on the floor or keeps it above."""
 
 from __future__ import annotations
 
@@ -29,23 +29,40 @@ def place_on_floor(points: Array, angle: float, about: Array, lift: float, out: 
     Returns:
         The rise [m].
     """
-    return _place_on_floor(points, math.cos(angle), math.sin(angle), about, lift, out)
+    rise = max(lift, -_turn_level(points, math.cos(angle), math.sin(angle), about, out))
+    _raise(points, rise, out)
+    return rise
+
+
+def place_above_floor(
+    points: Array, angle: float, about: Array, clearance: float, out: Array
+) -> float:
+    """Turn points like `place_on_floor`, and put the lowest one `clearance` [m] above the floor.
+
+    Returns:
+        The rise [m], which is negative for points that were higher.
+    """
+    rise = clearance - _turn_level(points, math.cos(angle), math.sin(angle), about, out)
+    _raise(points, rise, out)
+    return rise
 
 
 @kernel
-def _place_on_floor(
-    points: Array, cosine: float, sine: float, about: Array, lift: float, out: Array
-) -> float:
+def _turn_level(points: Array, cosine: float, sine: float, about: Array, out: Array) -> float:
+    """Write the turned x and z; return the lowest y."""
     lowest = np.inf
     for i in range(len(points)):
         x, z = points[i, 0] - about[0], points[i, 2] - about[2]
         out[i, 0] = about[0] + (cosine * x + sine * z)
         out[i, 2] = about[2] + (cosine * z - sine * x)
         lowest = min(lowest, points[i, 1])
-    rise = max(lift, -lowest)
+    return lowest
+
+
+@kernel
+def _raise(points: Array, rise: float, out: Array) -> None:
     for i in range(len(points)):
         out[i, 1] = points[i, 1] + rise
-    return rise
 
 
 def turned_rotations(rotations: Array, angle: float) -> Array:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from solvers.retarget.ground_contact import place_on_floor, turned_rotations
+from solvers.retarget.ground_contact import place_above_floor, place_on_floor, turned_rotations
 from solvers.retarget.heading import turned
 
 POINTS = np.random.default_rng(0).normal(size=(50, 3))
@@ -35,3 +35,15 @@ def test_it_turns_as_a_rotation_about_the_vertical_does() -> None:
     np.testing.assert_allclose(
         Rotation.from_quat(turns).as_matrix(), (whole * own).as_matrix(), atol=1e-14
     )
+
+
+@pytest.mark.parametrize("clearance", [0.0, 0.37])
+def test_the_lowest_point_is_put_as_high_as_asked(clearance: float) -> None:
+    out, same = np.empty_like(POINTS), np.empty_like(POINTS)
+    rise = place_above_floor(POINTS, 0.8, ABOUT, clearance, out)
+    assert rise == clearance - LOWEST
+    assert out[:, 1].min() == pytest.approx(clearance, abs=1e-15)
+    place_on_floor(POINTS, 0.8, ABOUT, rise, same)
+    np.testing.assert_array_equal(out, same)
+    raised = POINTS + UP * 5.0  # it also comes down
+    assert place_above_floor(raised, 0.0, ABOUT, clearance, out) == pytest.approx(rise - 5.0)

@@ -1,0 +1,202 @@
+"""Inverse kinematics of a limb of two bones: turns thigh and shin so that the ankle is elsewhere.
+
+The triangle of hip, knee and ankle is known by its three sides (law of cosines). The knee stays on
+its own side of the limb, and a limb whose ankle need not move is not turned at all. Goals near full
+reach are softened by `within_reach`.
+
+Source: for the soft limit A. Nicholls (2009), "Soft IK", without the threshold's effect on limbs
+that are straighter than the threshold themselves.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from solvers.kernels.compiled import kernel
+from solvers.kernels.quaternion import Quaternion, Vector, between, multiply, normalized, rotate
+
+Array = NDArray[np.float64]
+
+SOFT = 0.02  # of the limb's length: how far before full reach a limb starts to lag behind its goal
+_SENSE = 0.02  # of the limb's length: knees that stand out less bend about the given axis
+_NOTHING = 1e-9  # of the limb's length
+
+
+def two_bone_turns(joints: Array, goals: Array, axes: Array) -> Array:
+    """Return the rotations of both bones of L limbs that bring their ankles to their goals.
+
+    A goal out of reach is met in direction; the limb is then straight, or folded as far as it goes.
+
+    Args:
+        joints: (L, 3, 3) [m] hip, knee and ankle of each limb (or shoulder, elbow and wrist).
+        goals: (L, 3) [m] of the ankles.
+        axes: (L, 3) the axis about which a straight limb's lower bone turns when the limb bends (by
+            the right-hand rule); for the knees of a body that faces +Z it is +X.
+
+    Returns:
+        (L, 2, 4) quaternions, world, of the upper and the lower bone, since `joints`. The lower
+        bone starts where the upper one ends then. Finite for joints that coincide.
+    """
+    out = np.empty((len(joints), 2, 4))
+    _turn_all(joints, goals, axes, out)
+    return out
+
+
+@kernel
+def _turn_all(joints: Array, goals: Array, axes: Array, out: Array) -> None:
+    for i in range(len(joints)):
+        upper, lower = bend(
+            (joints[i, 0, 0], joints[i, 0, 1], joints[i, 0, 2]),
+            (joints[i, 1, 0], joints[i, 1, 1], joints[i, 1, 2]),
+            (joints[i, 2, 0], joints[i, 2, 1], joints[i, 2, 2]),
+            (goals[i, 0], goals[i, 1], goals[i, 2]),
+            (axes[i, 0], axes[i, 1], axes[i, 2]),
+        )
+        out[i, 0, 0], out[i, 0, 1], out[i, 0, 2], out[i, 0, 3] = upper
+        out[i, 1, 0], out[i, 1, 1], out[i, 1, 2], out[i, 1, 3] = lower
+
+
+@kernel
+def bend(
+    hip: Vector, knee: Vector, ankle: Vector, goal: Vector, axis: Vector
+) -> tuple[Quaternion, Quaternion]:
+    """Return the rotations of the upper and the lower bone: see `two_bone_turns`."""
+    upper, lower = _minus(knee, hip), _minus(ankle, knee)
+    a, b = _length(upper), _length(lower)
+    still = (0.0, 0.0, 0.0, 1.0)
+    if min(a, b) <= _NOTHING * (a + b):
+        return still, still
+    line, wish = _minus(ankle, hip), _minus(goal, hip)
+    before, wanted = _length(line), _length(wish)
+    least = _NOTHING * (a + b)
+    # A limb that is folded onto its hip points nowhere: its upper bone stands for it.
+    along = _scaled(line, 1.0 / before) if before > least else _scaled(upper, 1.0 / a)
+    towards = _scaled(wish, 1.0 / wanted) if wanted > least else along
+    swing = between(along, towards, axis)
+    after = min(max(wanted, abs(a - b)), a + b)
+    forth = 0.5 * after
+    if after > least:
+        forth = 0.5 * (after + (a * a - b * b) / after)
+    forth = min(max(forth, -a), a)
+    aside = _knee_side(upper, along, axis, swing, towards, a, forth, a + b)
+    new_upper = _plus(_scaled(towards, forth), aside)
+    new_lower = _minus(_scaled(towards, after), new_upper)
+    return (
+        _turned_to(upper, new_upper, swing, axis),
+        _turned_to(lower, new_lower, swing, axis),
+    )
+
+
+@kernel
+def _knee_side(
+    upper: Vector,
+    along: Vector,
+    axis: Vector,
+    swing: Quaternion,
+    towards: Vector,
+    length: float,
+    forth: float,
+    limb: float,
+) -> Vector:
+    """Where the knee is off the line from hip to goal: on its own side, as far as it has to be."""
+    own = rotate(swing, _minus(upper, _scaled(along, _dot(upper, along))))
+    stands_out = _length(own)
+    far = math.sqrt(max(length * length - forth * forth, 0.0))
+    x, y, z = towards
+    any_side = _unit((0.0, -z, y) if abs(x) < 0.9 else (-z, 0.0, x), (0.0, 0.0, 0.0))
+    side = _unit(_cross(towards, rotate(swing, axis)), any_side)
+    side = _unit(_plus(_scaled(own, 1.0 / limb), _scaled(side, _SENSE)), _unit(own, side))
+    # What is added to the knee's own offset goes to that side, so that nothing to add is nothing.
+    moved = _plus(own, _scaled(side, far - stands_out))
+    moved = _minus(moved, _scaled(towards, _dot(moved, towards)))
+    return _scaled(_unit(moved, side), far)
+
+
+@kernel
+def _turned_to(old: Vector, new: Vector, swing: Quaternion, axis: Vector) -> Quaternion:
+    """The swing, and after it the smallest rotation that takes one bone's direction to another."""
+    here = _unit(rotate(swing, old), (0.0, 1.0, 0.0))
+    return normalized(multiply(between(here, _unit(new, here), axis), swing))
+
+
+@kernel
+def within_reach(hip: Vector, ankle: Vector, goal: Vector, length: float) -> Vector:
+    """Return a goal that a limb can reach, at the goal's place on the ground wherever possible.
+
+    A limb that gets straight is led there softly: a goal farther off than the limb reaches is
+    raised (or lowered, above the hip). Where even the level distance is too far, it comes nearer.
+    The limb's own ankle is always within reach, and so are goals no farther off.
+
+    Args:
+        hip, ankle: [m] the limb before.
+        goal: [m] for the ankle.
+        length: [m] of both bones together.
+    """
+    wish = _minus(goal, hip)
+    own, far = _length(_minus(ankle, hip)), _length(wish)
+    soft = soft_reach(far, own, length)
+    if far <= soft:
+        return goal
+    level = math.sqrt(wish[0] * wish[0] + wish[2] * wish[2])
+    if level >= soft:
+        share = soft / level
+        return (hip[0] + share * wish[0], hip[1], hip[2] + share * wish[2])
+    height = math.copysign(math.sqrt(soft * soft - level * level), wish[1])
+    return (goal[0], hip[1] + height, goal[2])
+
+
+@kernel
+def soft_reach(wanted: float, own: float, length: float) -> float:
+    """Return how far a limb reaches for a goal `wanted` [m] off: smooth, and never its length.
+
+    Args:
+        wanted: [m] from hip to goal.
+        own: [m] from hip to ankle before: so far it reaches exactly.
+        length: [m] of both bones together.
+    """
+    room = min(SOFT * length, max(length - own, 0.0))
+    start = length - room
+    if wanted <= start:
+        return wanted
+    if room <= _NOTHING * length:
+        return start
+    return start + room * (1.0 - math.exp((start - wanted) / room))
+
+
+@kernel
+def _plus(a: Vector, b: Vector) -> Vector:
+    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
+
+
+@kernel
+def _minus(a: Vector, b: Vector) -> Vector:
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+@kernel
+def _scaled(a: Vector, by: float) -> Vector:
+    return (by * a[0], by * a[1], by * a[2])
+
+
+@kernel
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@kernel
+def _cross(a: Vector, b: Vector) -> Vector:
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
+
+
+@kernel
+def _length(a: Vector) -> float:
+    return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
+
+
+@kernel
+def _unit(a: Vector, otherwise: Vector) -> Vector:
+    length = _length(a)
+    return _scaled(a, 1.0 / length) if length > 1e-12 else otherwise

@@ -1,0 +1,53 @@
+"""A performer who stands, sits or lies is on the floor; one who jumps is as high as they jump."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from solvers.retarget.clearance import JUMPS, STANDS, clearance
+
+TALL = 1.7
+NO_FEET = np.zeros((0, 2))
+
+
+def jump(height: float) -> float:
+    joints = np.array([[0.0, 0.9 + height, 0.0], [0.0, 0.1 + height, 0.0]])
+    return clearance(np.full((2, 2), height), joints, 0.0, TALL)
+
+
+@pytest.mark.parametrize("height", [-0.1, 0.0, 0.02, STANDS * TALL])
+def test_a_performer_who_stands_is_on_the_floor(height: float) -> None:
+    assert jump(height) == 0.0
+
+
+@pytest.mark.parametrize("height", [JUMPS * TALL, 0.3, 0.7])
+def test_a_jump_is_as_high_as_the_performers(height: float) -> None:
+    joints = np.array([[0.0, 0.9 + height, 0.0]])
+    assert clearance(np.full((2, 2), height), joints, 0.0, TALL) == pytest.approx(height)
+
+
+@given(st.floats(-0.1, 0.4))
+def test_it_rises_with_the_performer_and_smoothly(height: float) -> None:
+    less, more = jump(height), jump(height + 1e-4)
+    assert 0.0 <= less <= more <= less + 2.5e-4
+
+
+def test_one_foot_on_the_floor_is_enough() -> None:
+    joints = np.array([[0.0, 0.9, 0.0]])
+    feet = np.array([[0.3, 0.4], [0.1, 0.0]])
+    assert clearance(feet, joints, 0.0, TALL) == 0.0
+
+
+@pytest.mark.parametrize("rests", [0.05, 0.11])
+def test_who_sits_or_lies_is_on_the_floor(rests: float) -> None:
+    joints = np.array([[0.0, rests, 0.0], [0.4, 0.3, 0.0]])
+    assert clearance(np.full((2, 2), 0.4), joints, 0.0, TALL) == 0.0
+
+
+def test_a_body_without_feet_stands_on_its_joints() -> None:
+    joints = np.array([[0.0, 0.3, 0.0]])
+    assert clearance(NO_FEET, joints, 0.0, TALL) == pytest.approx(0.3 - 0.05 * TALL)
+    assert clearance(NO_FEET, joints, 0.25, TALL) == 0.0
