@@ -19,3 +19,9 @@ def mirrored(positions: Array, partner: NDArray[np.int64]) -> Array:
     """
     seen: Array = positions[partner] * ACROSS
     return seen
+
+
+def mirrored_rotations(rotations: Array, partner: NDArray[np.int64]) -> Array:
+    """Return rotations (J, 4), world, as in the same mirror."""
+    seen: Array = rotations[partner] * np.array([1.0, -1.0, -1.0, 1.0])
+    return seen

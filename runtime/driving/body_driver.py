@@ -13,14 +13,17 @@ from devices.errors import InputError
 from devices.skeleton import Skeleton
 from runtime.driving.body_parts import BodyParts, body_parts
 from runtime.driving.driver import DrivenPart, Highlight, Needs
+from runtime.driving.joint_turns import JointTurns
 from runtime.driving.pairing import Pairing
 from runtime.driving.part_names import part_name
 from runtime.driving.performer import Pose, Rest
 from runtime.driving.targets import HandleTargets, Placement, PosedNodes, Targets
 from runtime.puppet.bound_skeleton import Anchors
 from solvers.retarget.heading import heading, turned
+from solvers.retarget.joint_rotations import RestTurn
 from solvers.retarget.limb_posing import pose_limbs
 from solvers.retarget.trunk_turns import UPRIGHT, orientations, trunk_turns
+from solvers.skeleton.quaternions import multiply
 
 Array = NDArray[np.float64]
 
@@ -37,6 +40,7 @@ class BodyState:
         trunk: (3, 4) the last turns of pelvis, chest and head.
         twists: (S,) [rad] of the forearms.
         nodes: the posed nodes.
+        rest_turn: what the performer's rotations mean.
     """
 
     rest: Rest | None
@@ -44,6 +48,7 @@ class BodyState:
     trunk: Array
     twists: Array
     nodes: PosedNodes
+    rest_turn: RestTurn | None
 
 
 class BodyDriver:
@@ -66,9 +71,8 @@ class BodyDriver:
             who = character.name if plan is None else "the performer"
             raise InputError(f"{who} has no limbs that are known: use --drive relative")
         self._facing = facing_of(character.skeleton, plan)
-        upright = turned(
-            performer.rest_positions, self._facing - facing_of(performer, source), np.zeros(3)
-        )
+        heading_at_rest = facing_of(performer, source)
+        upright = turned(performer.rest_positions, self._facing - heading_at_rest, np.zeros(3))
         parts = body_parts(
             performer,
             pairing.joints,
@@ -76,6 +80,7 @@ class BodyDriver:
             skeleton.tree.rerooted(plan.hips),
             plan,
             source,
+            self._facing,
         )
         if parts is None:
             raise InputError(f"{character.name} has no part that the performer has too")
@@ -83,6 +88,9 @@ class BodyDriver:
         self._skeleton = skeleton
         self._character = character
         self._upright = self._neutral(upright)
+        self._joint_turns = JointTurns(
+            performer, (*parts.hands, parts.skull), heading_at_rest, self._facing
+        )
         self._rest: Rest | None = None
         self._ratio = self._size_ratio(upright)
         self._hips = plan.hips
@@ -137,7 +145,10 @@ class BodyDriver:
         joints = pose.facing(self._facing)
         self._trunk = trunk_turns(joints, self._parts.trunk, self._upright, self._trunk)
         rotations, positions = np.empty((len(rig.order), 4)), np.empty((len(rig.order), 3))
-        given = np.zeros((len(rig.near), 4))
+        own = self._joint_turns.turns(pose)
+        given = self._given(own[:-1])
+        if own[-1].any():
+            self._trunk[2] = own[-1]
         pose_limbs(rig, joints, self._trunk, given, self._twists, rotations, positions)
         self._nodes = PosedNodes(positions, rotations)
         anchors = Anchors(
@@ -152,6 +163,13 @@ class BodyDriver:
             self._skeleton.rest_targets.weights,
         )
         return Targets(handles, self._placement(pose, rest), self._nodes)
+
+    def _given(self, hands: Array) -> Array:
+        """The rotations (S, 4) of segments that the performer's rotations (S, 4) decide."""
+        known = hands.any(axis=1) & (self._parts.rig.across[:, 0] < 0)
+        given = np.zeros_like(hands)
+        given[known] = multiply(hands[known], self._parts.hand_change[known])
+        return given
 
     def _placement(self, pose: Pose, rest: Rest) -> Placement:
         """Where the whole goes: the hips travel as the performer's, in lengths of the legs."""
@@ -198,13 +216,21 @@ class BodyDriver:
     def snapshot(self) -> BodyState:
         """Return what is remembered: see `Driver.snapshot`."""
         origin = np.full(2, np.nan) if self._origin is None else self._origin
-        return BodyState(self._rest, origin, self._trunk, self._twists.copy(), self._nodes)
+        return BodyState(
+            self._rest,
+            origin,
+            self._trunk,
+            self._twists.copy(),
+            self._nodes,
+            self._joint_turns.snapshot(),
+        )
 
     def restore(self, state: BodyState) -> None:
         """Go back to a snapshot."""
         self._rest, self._trunk, self._nodes = state.rest, state.trunk, state.nodes
         self._origin = None if np.isnan(state.origin).any() else state.origin
         self._twists = state.twists.copy()
+        self._joint_turns.restore(state.rest_turn)
 
 
 def facing_of(skeleton: Skeleton, plan: BodyPlan) -> float:

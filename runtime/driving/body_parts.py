@@ -15,6 +15,7 @@ from devices.skeleton import Skeleton
 from runtime.driving.driver import ABSOLUTE, RELATIVE
 from solvers.retarget.limb_posing import BLENDS, RIDES, LimbRig, hand_frame
 from solvers.retarget.trunk_turns import TrunkJoints
+from solvers.skeleton.quaternions import conjugate, multiply
 from solvers.skeleton.tree import Tree
 
 Array = NDArray[np.float64]
@@ -52,7 +53,8 @@ class BodyParts:
         parts: in words, from the trunk outward.
         rig: the character's nodes and what turns them.
         trunk: the performer's joints that show how the trunk is turned.
-        hands: for each segment of a hand the performer's joint that turns it, -1 for none; (S,).
+        hands: (S,) for each segment of a hand the performer's joint that turns it, -1 for none.
+        hand_change: (S, 4) from the character's hand at rest to the performer's at rest.
         skull: the performer's joint that turns the head; -1 for none.
         legs: the legs of both: (hip, knee, ankle) joints and nodes.
     """
@@ -61,6 +63,7 @@ class BodyParts:
     rig: LimbRig
     trunk: TrunkJoints
     hands: NDArray[np.int64]
+    hand_change: Array
     skull: int
     legs: tuple[tuple[Chain, Chain], ...]
 
@@ -72,6 +75,7 @@ def body_parts(
     tree: Tree,
     plan: BodyPlan,
     source: BodyPlan,
+    facing: float,
 ) -> BodyParts | None:
     """Return the parts that both bodies have; None where no limb and no head corresponds.
 
@@ -82,8 +86,9 @@ def body_parts(
         tree: the character's nodes at rest, rooted at its hips.
         plan: the character's body.
         source: the performer's body.
+        facing: [rad] the heading of both.
     """
-    rig = _Rig(tree, upright)
+    rig = _Rig(tree, upright, facing)
     parts: list[Part] = []
     legs = []
     chosen = frozenset(joints)
@@ -114,6 +119,7 @@ def body_parts(
         rig.finished(),
         _trunk_joints(performer, source, chosen),
         np.array(rig.hands, dtype=np.int64),
+        np.array(rig.hand_change),
         skull,
         tuple(legs),
     )
@@ -122,8 +128,9 @@ def body_parts(
 class _Rig:
     """Collects the segments of a `LimbRig`."""
 
-    def __init__(self, tree: Tree, upright: Array) -> None:
+    def __init__(self, tree: Tree, upright: Array, facing: float) -> None:
         self._tree, self._rest, self._upright = tree, tree.positions, upright
+        self._front = np.array([np.sin(facing), 0.0, np.cos(facing)])
         self._role = np.full(len(tree), RIDES)
         self._share = np.zeros(len(tree))
         self._near: list[int] = []
@@ -134,6 +141,7 @@ class _Rig:
         self._is_free: list[bool] = []
         self._twisted_by: list[int] = []
         self.hands: list[int] = []
+        self.hand_change: list[Array] = []
 
     def add_leg(self, theirs: Limb, ours: Limb) -> str:
         """Let a leg follow a leg; return how it is driven."""
@@ -167,14 +175,28 @@ class _Rig:
         if not (ours.end and theirs.end):
             return drive
         hand = self._add(ours.end, theirs.end[0], theirs.end[-1])
-        self.hands[hand] = theirs.end[0]
-        if source_knuckles and target_knuckles:
-            self._across[hand] = source_knuckles
-            self._frame[hand] = hand_frame(self._rest, ours.end[0], ours.end[-1], target_knuckles)
+        frame = self._hand_at_rest(self._rest, ours.end, target_knuckles)
+        if source_knuckles:
+            self._across[hand], self._frame[hand] = source_knuckles, frame
+        else:
+            self.hands[hand] = theirs.end[0]
+            theirs_at_rest = self._hand_at_rest(self._upright, theirs.end, None)
+            self.hand_change[hand] = multiply(theirs_at_rest, conjugate(frame))
         if ours.lower:
             self._twisted_by[last] = hand
             self._take_beside(ours, hand)
         return drive
+
+    def _hand_at_rest(self, points: Array, hand: Chain, knuckles: tuple[int, int] | None) -> Array:
+        """The orientation (4,) of a hand at rest; without knuckles its palm looks down or inward.
+
+        The index finger is then in front, as in a T pose and beside the thighs alike.
+        """
+        if knuckles is not None:
+            return hand_frame(points, hand[0], hand[-1], knuckles)
+        behind = points[hand[0]] - self._front
+        three = np.array([points[hand[0]], points[hand[-1]], behind])
+        return hand_frame(three, 0, 1, (0, 2))
 
     def add_fingers(self, source: BodyPlan, plan: BodyPlan, side: Side) -> None:
         """Let each finger follow the finger of the same name, bone for bone."""
@@ -241,6 +263,7 @@ class _Rig:
         self._is_free.append(False)
         self._twisted_by.append(-1)
         self.hands.append(-1)
+        self.hand_change.append(np.zeros(4))
         return number
 
     def _take_beside(self, ours: Limb, hand: int) -> None:

@@ -12,7 +12,7 @@ from devices.bodies.joint_names import Kind
 from devices.bodies.source_joints import source_joints, source_tree
 from devices.skeleton import Skeleton, SkeletonFrame
 from runtime.conditioning.conditioner import Conditioner, ConditionerState, warm
-from runtime.conditioning.mirror import mirrored
+from runtime.conditioning.mirror import mirrored, mirrored_rotations
 from runtime.conditioning.switches import Conditioning, filled_only
 from solvers.retarget.heading import heading, turned
 from solvers.skeleton.tree import Tree
@@ -40,6 +40,7 @@ class Pose:
         scale: the factor.
         time: [s] of the frame; NaN where it does not matter.
         performer: the performer's number.
+        rotations: (J, 4) joint to world, NaN where unknown; None where the source has none.
     """
 
     seen: Array
@@ -54,6 +55,7 @@ class Pose:
     scale: float = 1.0
     time: float = float("nan")
     performer: int = 0
+    rotations: Array | None = None
 
     def facing(self, heading: float) -> Array:
         """Return every joint (J, 3) [m] with the whole body turned to this heading [rad]."""
@@ -144,8 +146,14 @@ class Performer:
             scale=whole.scale,
             time=frame.time,
             performer=frame.performer,
+            rotations=self._rotations(frame, whole.mirrored),
         )
         return self.pose
+
+    def _rotations(self, frame: SkeletonFrame, mirror: bool) -> Array | None:
+        if frame.rotations is None or not mirror:
+            return frame.rotations
+        return mirrored_rotations(frame.rotations, self._conditioner.partner)
 
     def snapshot(self) -> PerformerState:
         """Return the memory between two frames; poses are immutable and shared."""

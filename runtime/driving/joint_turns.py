@@ -1,0 +1,66 @@
+"""How single joints of the performer are turned, where the stream gives rotations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from devices.skeleton import Skeleton
+from runtime.driving.performer import Pose
+from solvers.retarget.joint_rotations import RestTurn, fit_rest_turn
+from solvers.skeleton.quaternions import multiply
+
+Array = NDArray[np.float64]
+
+
+class JointTurns:
+    """The turns of some joints from the performer standing upright.
+
+    Args:
+        performer: the performer's skeleton.
+        joints: W joints; -1 for one that is never known.
+        upright: [rad] heading of the performer's rest pose.
+        facing: [rad] heading of the character, in whose direction the turns are given.
+    """
+
+    def __init__(
+        self, performer: Skeleton, joints: Sequence[int], upright: float, facing: float
+    ) -> None:
+        self._performer = performer
+        self._joints = np.array(joints, dtype=np.int64)
+        self._facing = facing
+        self._from_rest = about_vertical(upright - facing)
+        self._fitted: RestTurn | None = None
+
+    def turns(self, pose: Pose) -> Array:
+        """Return the world rotations (W, 4) of the joints from rest; zero where unknown."""
+        turns = np.zeros((len(self._joints), 4))
+        if pose.rotations is None or not len(self._joints):
+            return turns
+        if self._fitted is None:
+            rest = self._performer.rest_positions
+            self._fitted = fit_rest_turn(self._performer.parents, rest, pose.seen, pose.rotations)
+            if self._fitted is None:
+                return turns
+        own = pose.rotations[self._joints]
+        known = (self._joints >= 0) & self._fitted.is_usable[self._joints]
+        known &= np.isfinite(own).all(axis=1)
+        whole = about_vertical(self._facing - pose.heading)
+        turned = multiply(whole, multiply(own, multiply(self._fitted.turn, self._from_rest)))
+        turns[known] = turned[known]
+        return turns
+
+    def snapshot(self) -> RestTurn | None:
+        """Return what was fitted."""
+        return self._fitted
+
+    def restore(self, state: RestTurn | None) -> None:
+        """Go back to a snapshot."""
+        self._fitted = state
+
+
+def about_vertical(angle: float) -> Array:
+    """Return the rotation (4,) by `angle` [rad] about +Y."""
+    return np.array([0.0, np.sin(0.5 * angle), 0.0, np.cos(0.5 * angle)])

@@ -1,0 +1,73 @@
+"""Relates the rotations that a stream gives for its joints to a body at rest.
+
+"Joint to world" is the identity at rest in one file and a quarter turn in the next. One constant
+turn between joint and rest is fitted from the bones of one frame; where no such turn explains them,
+the rotations mean something else and only directions can be used.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from solvers.skeleton.quaternions import conjugate, rotate
+
+Array = NDArray[np.float64]
+
+MOST_RESIDUAL = np.radians(12.0)  # between where a bone is and where its joint says
+_FEWEST = 3  # bones that a fit needs
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class RestTurn:
+    """What turns each joint from rest to its rotation.
+
+    Attributes:
+        turn: (4,) from rest to the axes of every joint.
+        is_usable: (J,) whether the joint's rotation explains the bones that begin at it.
+    """
+
+    turn: Array
+    is_usable: NDArray[np.bool_]
+
+
+def fit_rest_turn(
+    parents: NDArray[np.int64], rest: Array, positions: Array, rotations: Array
+) -> RestTurn | None:
+    """Fit the constant turn between the joints' axes and the body at rest.
+
+    Args:
+        parents: (J,) parent of each joint, -1 at the root.
+        rest: (J, 3) [m] at rest.
+        positions: (J, 3) [m] in one frame.
+        rotations: (J, 4) in that frame, joint to world; NaN where unknown.
+
+    Returns:
+        None where no turn explains the bones.
+    """
+    child = np.flatnonzero(parents >= 0)
+    near = parents[child]
+    bones, moved = rest[child] - rest[near], positions[child] - positions[near]
+    long, now = np.linalg.norm(bones, axis=1), np.linalg.norm(moved, axis=1)
+    real = np.isfinite(rotations[near]).all(axis=1) & np.isfinite(now)
+    real &= (long > 1e-3 * long.max(initial=0.0)) & (now > 1e-3 * long.max(initial=0.0))
+    if real.sum() < _FEWEST:
+        return None
+    child, near = child[real], near[real]
+    bones = bones[real] / long[real, None]
+    local = rotate(conjugate(rotations[near]), moved[real] / now[real, None])
+    # The bones are weighed alike twice: a few that bend otherwise must not tilt the fit.
+    weights = np.ones(len(near))
+    for _ in range(3):
+        turn, _ = Rotation.align_vectors(local, bones, weights)
+        cosine = np.einsum("ij,ij->i", turn.apply(bones), local)
+        residual = np.arccos(np.clip(cosine, -1.0, 1.0))
+        weights = 1.0 / (1.0 + (residual / MOST_RESIDUAL) ** 2)
+    if float(np.median(residual)) > MOST_RESIDUAL:
+        return None
+    worst = np.zeros(len(parents))
+    np.maximum.at(worst, near, residual)
+    return RestTurn(turn.as_quat(), worst <= MOST_RESIDUAL)
