@@ -17,8 +17,7 @@ from runtime.driving.joint_turns import JointTurns
 from runtime.driving.pairing import Pairing
 from runtime.driving.part_names import part_name
 from runtime.driving.performer import Pose, Rest
-from runtime.driving.targets import HandleTargets, Placement, PosedNodes, Targets
-from runtime.puppet.bound_skeleton import Anchors
+from runtime.driving.targets import Placement, PosedNodes, Targets
 from solvers.retarget.heading import heading, turned
 from solvers.retarget.joint_rotations import RestTurn
 from solvers.retarget.limb_posing import pose_limbs
@@ -94,7 +93,6 @@ class BodyDriver:
         self._rest: Rest | None = None
         self._ratio = self._size_ratio(upright)
         self._hips = plan.hips
-        self._turn_of_anchor, self._pivots = self._anchors()
         self._origin: Array | None = None
         self._trunk = UPRIGHT
         self._twists = np.zeros(len(parts.rig.near))
@@ -125,12 +123,6 @@ class BodyDriver:
             return ours / theirs
         return float(np.ptp(nodes[:, 1])) / max(float(np.ptp(upright[:, 1])), 1e-9)
 
-    def _anchors(self) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """For each anchor the node that turns it, and the node about which it turns."""
-        binding, parents = self._skeleton.binding, self._parts.rig.parents
-        upper = np.where(parents[binding.node] == binding.pivot, binding.pivot, binding.node)
-        return upper, binding.pivot
-
     def prepare(self, clip: Sequence[Pose], rest: Rest | None) -> None:
         """Start to drive from this rest state: see `Driver.prepare`."""
         self._rest = rest
@@ -151,18 +143,8 @@ class BodyDriver:
             self._trunk[2] = own[-1]
         pose_limbs(rig, joints, self._trunk, given, self._twists, rotations, positions)
         self._nodes = PosedNodes(positions, rotations)
-        anchors = Anchors(
-            rotations[self._turn_of_anchor],
-            positions[self._pivots],
-            np.ones(len(self._pivots)),
-            np.eye(3),
-        )
-        handles = HandleTargets(
-            self._skeleton.handles,
-            self._skeleton.handle_positions(anchors, 0.5),
-            self._skeleton.rest_targets.weights,
-        )
-        return Targets(handles, self._placement(pose, rest), self._nodes)
+        shape = self._skeleton.skinned(self._nodes)
+        return Targets(shape, self._placement(pose, rest), self._nodes)
 
     def _given(self, hands: Array) -> Array:
         """The rotations (S, 4) of segments that the performer's rotations (S, 4) decide."""
