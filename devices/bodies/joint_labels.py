@@ -8,10 +8,19 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.bodies.joint_names import FINGERS, BodyPart, Kind, Side, part_of_name
+from devices.bodies.joint_names import FINGERS, BodyPart, Kind, Limb, Side, part_of_name
 from devices.skeleton import Skeleton
 
 _SIDED = (Side.LEFT, Side.RIGHT)
+_LEG = (Kind.UPPER_LEG, Kind.LOWER_LEG)
+_ARM = (Kind.UPPER_ARM, Kind.LOWER_ARM, Kind.HAND)
+_ARM_OF_LEG = {
+    Kind.HIPS: Kind.SHOULDER,
+    Kind.UPPER_LEG: Kind.UPPER_ARM,
+    Kind.LOWER_LEG: Kind.LOWER_ARM,
+    Kind.FOOT: Kind.HAND,
+    Kind.TOES: Kind.HAND,
+}
 _BY_NUMBER = (Kind.THUMB, Kind.INDEX, Kind.MIDDLE, Kind.RING, Kind.LITTLE)
 _ENOUGH = 4  # parts known by name, below which the shape of the skeleton decides
 _MOST_JOINTS_BY_SHAPE = 1000  # a larger skeleton is not a body; the search is quadratic
@@ -21,8 +30,9 @@ def label_joints(skeleton: Skeleton) -> tuple[BodyPart | None, ...]:
     """Return the body part that begins at each joint; None where it is unknown.
 
     Names decide first (`devices.bodies.joint_names`). Words that mean different joints in different
-    conventions are resolved by the other joints of the same side. If too few names are known, the
-    shape of the rest pose decides; it assumes that the performer's left is at +X.
+    conventions are resolved by the other joints of the same side. Forelegs are arms, unless the
+    body has arms as well. If too few names are known, the shape of the rest pose decides; it
+    assumes that the performer's left is at +X.
     """
     parts: list[BodyPart | None] = [part_of_name(name) for name in skeleton.names]
     named = sum(part is not None and part.kind is not Kind.ROOT for part in parts)
@@ -31,7 +41,9 @@ def label_joints(skeleton: Skeleton) -> tuple[BodyPart | None, ...]:
         if any(part is not None for part in shape):
             return tuple(shape)
     for side in _SIDED:
-        _settle_limb(parts, side, skeleton)
+        for fore in (False, True):
+            _settle_limb(parts, side, skeleton, fore=fore)
+        _settle_pairs(parts, side, skeleton)
     _settle_centre(parts, skeleton)
     _settle_fingers(parts, skeleton)
     return tuple(parts)
@@ -68,25 +80,31 @@ def first_of(
     return None
 
 
-def _settle_limb(parts: list[BodyPart | None], side: Side, skeleton: Skeleton) -> None:
+def _settle_limb(
+    parts: list[BodyPart | None], side: Side, skeleton: Skeleton, *, fore: bool
+) -> None:
     """Resolve the meaning of "shoulder", "hip", "arm", "leg" and "foot" on one side.
+
+    `fore`: of the forelegs, not of all other limbs.
 
     Kinect and SMPL name points: the upper arm begins at "ShoulderLeft" and the toes at "FootLeft".
     Rigs name bones: the clavicle is "LeftShoulder" and the shin "LeftLeg".
     """
 
+    members = [
+        joint
+        for joint in skeleton.order
+        if (part := parts[joint]) is not None
+        and part.side is side
+        and not part.tip
+        and (part.limb is Limb.FORE) is fore
+    ]
+
     def joints(*words: str) -> list[int]:
-        return [
-            joint
-            for joint in skeleton.order
-            if (part := parts[joint]) is not None
-            and part.side is side
-            and not part.tip
-            and part.word in words
-        ]
+        return [joint for joint in members if (part := parts[joint]) and part.word in words]
 
     def has(kind: Kind) -> bool:
-        return first_of(parts, skeleton, kind, side) is not None
+        return any((part := parts[joint]) and part.kind is kind for joint in members)
 
     def settle(chosen: list[int], kind: Kind) -> None:
         for joint in chosen:
@@ -101,8 +119,32 @@ def _settle_limb(parts: list[BodyPart | None], side: Side, skeleton: Skeleton) -
     legs = joints("leg")
     if not has(Kind.UPPER_LEG) and (len(legs) == 2 or joints("knee", "shin", "calf", "lowerleg")):
         settle(legs[:1], Kind.UPPER_LEG)
-    if joints("ankle"):
-        settle(joints("foot"), Kind.TOES)
+    if joints("ankle", "hock", "horselink", "cannon"):
+        settle(joints("foot", "paw", "hoof"), Kind.TOES)
+
+
+def _settle_pairs(parts: list[BodyPart | None], side: Side, skeleton: Skeleton) -> None:
+    """Make forelegs arms; of a body that has arms, only the feet that its arms end in.
+
+    The joints of a wing are no arm beside arms or forelegs.
+    """
+
+    def of(kinds: Sequence[Kind], limb: Limb) -> bool:
+        return any(p and p.side is side and p.kind in kinds and p.limb is limb for p in parts)
+
+    armed = of(_ARM, Limb.PLAIN)
+    four_legged = not armed and of(_LEG, Limb.FORE)
+    for joint in skeleton.order:
+        part = parts[joint]
+        if part is None or part.side is not side or not (armed or four_legged):
+            continue
+        parent = int(skeleton.parents[joint])
+        above = parts[parent] if parent >= 0 else None
+        on_arm = above is not None and above.side is side and above.kind in _ARM
+        if part.limb is Limb.WING and part.kind in (Kind.SHOULDER, *_ARM):
+            parts[joint] = replace(part, kind=Kind.WING)
+        elif part.kind in _ARM_OF_LEG and (on_arm or (four_legged and part.limb is Limb.FORE)):
+            parts[joint] = replace(part, kind=_ARM_OF_LEG[part.kind])
 
 
 def _settle_centre(parts: list[BodyPart | None], skeleton: Skeleton) -> None:

@@ -48,8 +48,21 @@ class Kind(StrEnum):
     FOOT = "foot"
     TOES = "toes"
     TAIL = "tail"
+    WING = "wing"
+    FIN = "fin"
     FACE = "face"
     HELPER = "helper"
+
+
+class Limb(StrEnum):
+    """Which limb of a creature a name says: one of two pairs of legs, a wing or a fin."""
+
+    PLAIN = ""
+    FORE = "foreleg"
+    MIDDLE = "middle leg"
+    HIND = "hind leg"
+    WING = "wing"
+    FIN = "fin"
 
 
 FINGERS = (Kind.THUMB, Kind.INDEX, Kind.MIDDLE, Kind.RING, Kind.LITTLE, Kind.FINGER)
@@ -66,6 +79,7 @@ class BodyPart:
         mean different joints in different conventions; `devices.bodies.joint_labels` resolves
         them.
     number: the first number in the name, or None ("finger2-1" has 2).
+    limb: the limb that the name says; plain for a person's arms and legs.
     """
 
     kind: Kind
@@ -73,6 +87,7 @@ class BodyPart:
     tip: bool = False
     word: str = ""
     number: int | None = None
+    limb: Limb = Limb.PLAIN
 
 
 def _listed(words: str) -> list[str]:
@@ -87,7 +102,7 @@ _WORDS: dict[Kind, str] = {
     Kind.CHEST: "chest upperchest spinechest spineshoulder shouldercenter shouldercentre thorax "
     "sternum upperback chestlower chestupper ribcage ribs midshoulder midshoulders spineupper",
     Kind.NECK: "neck lowerneck upperneck neckbase necklower neckupper",
-    Kind.HEAD: "head skull headcenter",
+    Kind.HEAD: "head skull scull headcenter",
     Kind.SHOULDER: "shoulder shldr clavicle collar collarbone scapula clav",
     Kind.UPPER_ARM: "arm upperarm uparm uarm humerus shoulderbend shldrbend bicep",
     Kind.LOWER_ARM: "forearm lowerarm loarm lowarm farm radius ulna elbow forearmbend",
@@ -99,16 +114,21 @@ _WORDS: dict[Kind, str] = {
     Kind.LITTLE: "little pinky pinkie littlefinger pinkyfinger",
     Kind.FINGER: "finger fingers fingerbase metacarpal fingertip pointable carpal",
     Kind.UPPER_LEG: "upleg upperleg thigh femur uleg thighbend",
-    Kind.LOWER_LEG: "leg lowerleg lowleg loleg shin calf tibia knee crus",
-    Kind.FOOT: "foot ankle tarsal hock paw",
-    Kind.TOES: "toe toes toebase ball footindex metatarsal metatarsals bigtoe football smalltoe",
+    Kind.LOWER_LEG: "leg lowerleg lowleg loleg shin calf tibia knee crus stifle",
+    Kind.FOOT: "foot ankle tarsal hock paw hoof horselink cannon",
+    Kind.TOES: "toe toes toebase ball footindex metatarsal metatarsals bigtoe football smalltoe "
+    "fetlock pastern",
     Kind.TAIL: "tail",
+    Kind.WING: "wing",
+    Kind.FIN: "fin flipper",
     Kind.FACE: "face eye eyes eyelid eyebrow brow ear nose mouth jaw lip lips teeth tooth tongue "
     "cheek chin lid levator oris orbicularis temporalis oculi risorius special forehead nasal "
-    "nostril headset pupil snout whisker",
+    "nostril headset pupil snout whisker ears muzzle beak bill horn horns antler antlers antenna "
+    "antennae feeler mandible tusk fang crest mane",
     Kind.HELPER: "twist roll helper ik fk pole target ctrl control effector socket weapon prop "
     "hair ponytail bangs beard hat breast boob bust skirt cape cloth sleeve secondary sec heel "
-    "deltoid pectoral glute attach attachment locator camera marker collider holder",
+    "deltoid pectoral glute attach attachment locator camera marker collider holder "
+    "feather feathers membrane",
 }
 _KIND_OF_WORD = {word: kind for kind, words in _WORDS.items() for word in words.split()}
 # Words searched for inside a name of several words, before and after pairs of neighbouring words
@@ -137,26 +157,79 @@ _CENTRE = {"center", "centre", "mid", "c"}
 _END = {"end", "nub", "tip", "top", "endsite", "site", "leaf"}
 _SPLIT = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
 _PREFIX = re.compile(r"^(Bip\d+|ValveBiped|CC_Base|mixamorig\d*)[ _.]+", re.IGNORECASE)
+# The pair of legs that a name says, alone ("front_thigh", "FL_foot") or joined with a word of the
+# leg ("foreleg").
+_PAIRS = {
+    **dict.fromkeys(("front", "fore", "frnt"), Limb.FORE),
+    **dict.fromkeys(("mid", "middle"), Limb.MIDDLE),
+    **dict.fromkeys(("hind", "back", "rear"), Limb.HIND),
+}
+_CORNERS = {
+    letter + side: (pair, side)
+    for letter, pair in (("f", Limb.FORE), ("b", Limb.HIND), ("h", Limb.HIND), ("r", Limb.HIND))
+    for side in ("l", "r")
+}
+_OF_A_LEG = {
+    *(word for kind in (Kind.UPPER_LEG, Kind.LOWER_LEG) for word in _WORDS[kind].split()),
+    *(word for kind in (Kind.FOOT, Kind.TOES) for word in _WORDS[kind].split()),
+    *("hip", "pelvis", "shoulder", "scapula", "legs"),
+}
+_OF_A_MIDDLE_LEG = {"leg", *_WORDS[Kind.UPPER_LEG].split(), "lowerleg", "shin", "tibia", "knee"}
+_ONLY_OF_PAIRS = {"upper": "upperleg", "lower": "lowerleg"}  # "rear_l_upper"
+_OTHER_FINS = {"dorsal", "pelvic", "anal", "caudal", "ventral", "tail"}
 _VERTEBRA = re.compile(r"^[LTC]\d{1,2}$")  # Xsens: L5, L3, T12, T8
 
 
 @lru_cache(maxsize=16384)
 def part_of_name(name: str) -> BodyPart | None:
-    """Return the body part that a joint's name alone describes, or None for an unknown name."""
+    """Return the body part that a joint's name alone describes, or None for an unknown name.
+
+    The legs of four-legged creatures are legs here, also the front ones;
+    `devices.bodies.joint_labels` makes them arms.
+    """
     plain = re.split(r"[:|]", name)[-1].strip()
     if _VERTEBRA.match(plain):
         return BodyPart(Kind.CHEST if plain[0] == "T" else Kind.SPINE, word="spine")
-    if plain.startswith("__"):
-        return BodyPart(Kind.HELPER, word="helper")  # MakeHuman's stub bone before an offset bone
+    if plain.startswith("__") or plain.endswith(" parts"):
+        # MakeHuman's stub bone before an offset bone; a node where parallel bones separate.
+        return BodyPart(Kind.HELPER, word="helper")
     plain = _PREFIX.sub("", plain) or plain
     tokens = [token.lower() for token in _SPLIT.findall(plain)]
     digits = [int(token) for token in tokens if token.isdigit() and len(token) < 4]
-    words, side = _take_side([token for token in tokens if not token.isdigit()])
+    words, limb = _take_pair([token for token in tokens if not token.isdigit()])
+    words, side = _take_side(words)
     words, tip = _take_tip(words)
     word = _word_of(words, side)
     if word is None:
         return None
-    return BodyPart(_KIND_OF_WORD[word], side, tip, word, digits[0] if digits else None)
+    kind = _KIND_OF_WORD[word]
+    if kind is Kind.WING or "wing" in words:
+        limb = Limb.WING
+    elif kind is Kind.FIN:
+        limb = Limb.FIN
+    return BodyPart(kind, side, tip, word, digits[0] if digits else None, limb)
+
+
+def _take_pair(words: list[str]) -> tuple[list[str], Limb]:
+    """Remove the word for a pair of legs, where the rest of the name is a part of a leg."""
+    if len(words) > 2 and words[0] == "r" and words[-1] in ("l", "r"):
+        return words[1:], Limb.HIND  # a horse of Rigify: "r_toe.L"
+    for place, word in enumerate(words):
+        rest = [*words[:place], *words[place + 1 :]]
+        if word in _CORNERS and not _OF_A_LEG.isdisjoint(rest):
+            limb, side = _CORNERS[word]
+            return [*rest, side], limb
+        limb = _PAIRS.get(word, Limb.PLAIN)
+        known = _OF_A_MIDDLE_LEG if limb is Limb.MIDDLE else _OF_A_LEG
+        if limb is not Limb.PLAIN and not known.isdisjoint(rest):
+            return rest, limb
+        if limb is not Limb.PLAIN and word != "back" and not _ONLY_OF_PAIRS.keys().isdisjoint(rest):
+            return [_ONLY_OF_PAIRS.get(other, other) for other in rest], limb
+        for pair, limb in _PAIRS.items():
+            known = _OF_A_MIDDLE_LEG if limb is Limb.MIDDLE else _OF_A_LEG
+            if word.startswith(pair) and word.removeprefix(pair) in known:
+                return [*words[:place], word.removeprefix(pair), *words[place + 1 :]], limb
+    return words, Limb.PLAIN
 
 
 def _take_side(words: list[str]) -> tuple[list[str], Side]:
@@ -184,10 +257,10 @@ def _take_tip(words: list[str]) -> tuple[list[str], bool]:
 
 def _word_of(words: list[str], side: Side) -> str | None:
     """The table's word that matches the words of a name, or None."""
-    if words == ["mid"] and side is not Side.CENTRE:
-        return "middle"  # DAZ: rMid1
     if "".join(words) in _KIND_OF_WORD:
         return "".join(words)  # Kinect: SpineBase, where "base" alone would be noise
+    if words == ["mid"] and side is not Side.CENTRE:
+        return "middle"  # DAZ: rMid1
     central = any(word in _CENTRE for word in words)
     words = [word for word in words if word not in _CENTRE | _NOISE]
     whole = "".join(words)
@@ -198,7 +271,10 @@ def _word_of(words: list[str], side: Side) -> str | None:
     if "neck" in words:
         return "neck"  # Character Creator's NeckTwist is the neck itself
     pairs = [a + b for a, b in pairwise(words)] + [b + a for a, b in pairwise(words)]
-    candidates = [word for word in _FIRST if word in words]
+    candidates = []
+    if "fin" in words:  # before "pectoral", which alone is a muscle
+        candidates.append("fin" if _OTHER_FINS.isdisjoint(words) else "helper")
+    candidates += [word for word in _FIRST if word in words]
     candidates += [pair for pair in pairs if pair in _KIND_OF_WORD]
     candidates += [word for word in _LAST if word in words]
     candidates += [word for word in words if word in _KIND_OF_WORD]

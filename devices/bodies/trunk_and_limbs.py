@@ -88,8 +88,8 @@ def _reach(skeleton: Skeleton, parts: Sequence[BodyPart | None], joint: int) -> 
 
 
 def _is_trunk(part: BodyPart, hangs: bool) -> bool:
-    """Whether a part belongs to trunk or tail; `hangs`: the parent joint is kept."""
-    if part.kind is Kind.TAIL:
+    """Whether a part is trunk, tail, wing or fin; `hangs`: the parent joint is kept."""
+    if part.kind in (Kind.TAIL, Kind.WING, Kind.FIN):
         return True
     if part.side is not Side.CENTRE or part.kind not in _TRUNK:
         return False
