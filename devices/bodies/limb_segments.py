@@ -1,6 +1,7 @@
 """Divide a limb whose joints have no names of their own at its elbow and wrist, or knee and ankle.
 
-A limb bends where its rest pose does. A straight one is divided where a human limb is.
+A limb bends where its rest pose does. A straight one is divided where a human limb is. A head is
+divided from its neck in the same way.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ Chain = tuple[int, ...]
 # and ankle, from hip to sole or toe.
 _ARM = (0.40, 0.77)
 _LEG = (0.46, 0.90)
+_NECK = (0.33,)  # from the end of the trunk to the top of the head
 _FOOT_TURNS = np.cos(np.radians(50.0))  # least cosine between a shin and straight down
 _LONGEST_FOOT = 0.4  # share of the leg
 _TRUST = (
@@ -63,6 +65,20 @@ def leg_segments(chain: Sequence[int], positions: Array) -> tuple[Chain, ...]:
         return _cut(nodes, _best_bends(points, _LEG))
     knee = _best_bends(points[: ankle + 1], (_LEG[0] / _LEG[1],))
     return _cut(nodes, (*knee, ankle))
+
+
+def neck_and_head(chain: Sequence[int], positions: Array) -> tuple[Chain, ...]:
+    """Divide a head from its neck.
+
+    Args:
+        chain: nodes from the end of the trunk to the top of the head, or to the snout.
+        positions: (K, 3) at rest, of all nodes, in any unit.
+
+    Returns:
+        The neck and the head as chains of nodes; one part for two nodes, nothing for fewer.
+    """
+    nodes = _apart(chain, positions)
+    return _cut(nodes, _best_bends(positions[list(nodes)], _NECK))
 
 
 def bend_between(chain: Sequence[int], positions: Array) -> tuple[Chain, ...]:

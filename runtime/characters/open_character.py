@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from devices.bodies.body_plan import plan_by_names
+from devices.bodies.plan_by_names import plan_by_names
 from devices.errors import InputError
 from runtime.characters.builtin import BUILTIN, builtin_character
 from runtime.characters.character import Character

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.bodies.body_plan import SIDES, BodyPlan, plan_by_names
+from devices.bodies.body_plan import SIDES, BodyPlan
+from devices.bodies.plan_by_names import plan_by_names
 from devices.errors import InputError
 from devices.skeleton import Skeleton
 from runtime.driving.body_parts import BodyParts, body_parts

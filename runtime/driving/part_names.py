@@ -7,10 +7,10 @@ from devices.skeleton import Skeleton
 
 
 def part_name(skeleton: Skeleton, plan: BodyPlan | None, chain: Chain) -> str:
-    """Return what a chain of joints or nodes is: "left arm", else the name of its last joint."""
+    """Return what a chain is: "left arm", "right wing", else the name of its last joint."""
     if plan is not None:
-        limbs = [(f"{side} arm", limb) for side, limb in plan.arms.items()]
-        limbs += [(f"{side} leg", limb) for side, limb in plan.legs.items()]
+        limbs = [(f"{side} {plan.arm_word}", limb) for side, limb in plan.arms.items()]
+        limbs += [(f"{side} {plan.leg_word}", limb) for side, limb in plan.legs.items()]
         for name, limb in limbs:
             if chain[-1] in _nodes(limb):
                 return name

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.bodies.body_plan import plan_by_names
+from devices.bodies.plan_by_names import plan_by_names
 from devices.errors import InputError
 from runtime.driving.driven_chains import DrivenChains
 from runtime.driving.driver import RELATIVE, DrivenPart, Highlight, MappedDriver, Needs
