@@ -14,16 +14,19 @@ from devices.errors import InputError
 from devices.skeleton import Skeleton
 from runtime.driving.body_parts import BodyParts, body_parts
 from runtime.driving.driver import DrivenPart, Highlight, Needs
+from runtime.driving.footing import Footing, FootingState
 from runtime.driving.joint_turns import JointTurns
 from runtime.driving.pairing import Pairing
 from runtime.driving.part_names import part_name
+from runtime.driving.path import Path
 from runtime.driving.performer import Pose, Rest
-from runtime.driving.targets import Placement, PosedNodes, Targets
+from runtime.driving.root_motion import chain_length
+from runtime.driving.targets import PosedNodes, Targets
 from solvers.retarget.heading import heading, turned
 from solvers.retarget.joint_rotations import RestTurn
 from solvers.retarget.limb_posing import pose_limbs
 from solvers.retarget.trunk_turns import UPRIGHT, orientations, trunk_turns
-from solvers.skeleton.quaternions import multiply
+from solvers.skeleton.quaternions import multiply, rotate
 
 Array = NDArray[np.float64]
 
@@ -41,6 +44,7 @@ class BodyState:
         twists: (S,) [rad] of the forearms.
         nodes: the posed nodes.
         rest_turn: what the performer's rotations mean.
+        footing: of the feet.
     """
 
     rest: Rest | None
@@ -49,6 +53,7 @@ class BodyState:
     twists: Array
     nodes: PosedNodes
     rest_turn: RestTurn | None
+    footing: FootingState
 
 
 class BodyDriver:
@@ -94,6 +99,13 @@ class BodyDriver:
         self._rest: Rest | None = None
         self._ratio = self._size_ratio(upright)
         self._hips = plan.hips
+        body = {joint for part in parts.parts for joint in part.source}
+        body -= {joint for leg in parts.legs for joint in leg.source[2:]}
+        self._footing = Footing(
+            performer, upright, skeleton.tree.positions, parts.legs, sorted(body)
+        )
+        left = [np.cos(self._facing), 0.0, -np.sin(self._facing)]
+        self._left = np.array(left)
         self._origin: Array | None = None
         self._trunk = UPRIGHT
         self._twists = np.zeros(len(parts.rig.near))
@@ -117,9 +129,9 @@ class BodyDriver:
         """How long the character's legs are for each metre of the performer's."""
         nodes = self._skeleton.tree.positions
         theirs = ours = 0.0
-        for source, target in self._parts.legs:
-            theirs += float(np.linalg.norm(np.diff(upright[list(source)], axis=0), axis=1).sum())
-            ours += float(np.linalg.norm(np.diff(nodes[list(target)], axis=0), axis=1).sum())
+        for leg in self._parts.legs:
+            theirs += chain_length(upright, leg.source[:3])
+            ours += chain_length(nodes, leg.target[:3])
         if theirs > 0.0:
             return ours / theirs
         return float(np.ptp(nodes[:, 1])) / max(float(np.ptp(upright[:, 1])), 1e-9)
@@ -142,10 +154,25 @@ class BodyDriver:
         given = self._given(own[:-1])
         if own[-1].any():
             self._trunk[2] = own[-1]
+        self._footing.watch(pose)
+        left = rotate(self._trunk[0], self._left)
+        self._footing.turn_soles(joints, left, pose.time, given)
         pose_limbs(rig, joints, self._trunk, given, self._twists, rotations, positions)
+        path = self._path(pose, rest)
+        if self._footing.plant(
+            pose,
+            (positions, rotations),
+            left,
+            given,
+            performer_on_stage=path.performer_on_stage,
+            on_stage=path.on_stage,
+            off_stage=path.off_stage,
+        ):
+            pose_limbs(rig, joints, self._trunk, given, self._twists, rotations, positions)
         self._nodes = PosedNodes(positions, rotations)
         shape = self._skeleton.skinned(self._nodes)
-        return Targets(shape, self._placement(pose, rest), self._nodes)
+        placement = path.placement(self._ratio * self._footing.clearance(pose))
+        return Targets(shape, placement, self._nodes)
 
     def _given(self, hands: Array) -> Array:
         """The rotations (S, 4) of segments that the performer's rotations (S, 4) decide."""
@@ -154,24 +181,26 @@ class BodyDriver:
         given[known] = multiply(hands[known], self._parts.hand_change[known])
         return given
 
-    def _placement(self, pose: Pose, rest: Rest) -> Placement:
-        """Where the whole goes: the hips travel as the performer's, in lengths of the legs."""
+    def _path(self, pose: Pose, rest: Rest) -> Path:
+        """Where the whole is: the hips travel as the performer's, in lengths of the legs."""
         if self._origin is None:
             self._origin = pose.hips[[0, 2]]
-        turn = pose.heading - rest.heading
-        x, z = self._ratio * (pose.hips[[0, 2]] - self._origin)
-        way = turned(np.array([[x, 0.0, z]]), self._facing - rest.heading, np.zeros(3))[0]
-        about = self._skeleton.tree.positions[self._skeleton.root]
-        hips = self._parts.rig.rest[self._hips]
-        back = hips - turned(hips[None], turn, about)[0]
-        travel = (float(way[0] + back[0]), float(way[2] + back[2]))
-        return Placement(turn, travel, lift=-1e3)
+        return Path(
+            turn=pose.heading - rest.heading,
+            about=self._skeleton.tree.positions[self._skeleton.root],
+            hips=self._parts.rig.rest[self._hips],
+            origin=np.array([self._origin[0], 0.0, self._origin[1]]),
+            course=self._facing - rest.heading,
+            ratio=self._ratio,
+            performer=pose.hips,
+        )
 
     def reset(self) -> None:
         """Forget the poses before: see `Driver.reset`."""
         self._trunk = UPRIGHT
         self._twists = np.zeros(len(self._parts.rig.near))
         self._nodes = self._skeleton.rest_nodes
+        self._footing.reset()
 
     @property
     def parts(self) -> list[DrivenPart]:
@@ -206,6 +235,7 @@ class BodyDriver:
             self._twists.copy(),
             self._nodes,
             self._joint_turns.snapshot(),
+            self._footing.snapshot(),
         )
 
     def restore(self, state: BodyState) -> None:
@@ -214,6 +244,7 @@ class BodyDriver:
         self._origin = None if np.isnan(state.origin).any() else state.origin
         self._twists = state.twists.copy()
         self._joint_turns.restore(state.rest_turn)
+        self._footing.restore(state.footing)
 
 
 def facing_of(skeleton: Skeleton, plan: BodyPlan) -> float:

@@ -45,6 +45,21 @@ class Part:
     drive: str
 
 
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """A leg of the performer that drives a leg of the character.
+
+    Attributes:
+        source: the performer's hip, knee, ankle and toes; without toes the ankle twice.
+        target: the character's.
+        segments: numbers of thigh, shin and foot; -1 for a foot that is not driven.
+    """
+
+    source: tuple[int, int, int, int]
+    target: tuple[int, int, int, int]
+    segments: tuple[int, int, int]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyParts:
     """The corresponding parts of a performer and a character, ready to be posed.
@@ -56,7 +71,7 @@ class BodyParts:
         hands: (S,) for each segment of a hand the performer's joint that turns it, -1 for none.
         hand_change: (S, 4) from the character's hand at rest to the performer's at rest.
         skull: the performer's joint that turns the head; -1 for none.
-        legs: the legs of both: (hip, knee, ankle) joints and nodes.
+        legs: the legs of both.
     """
 
     parts: tuple[Part, ...]
@@ -65,7 +80,7 @@ class BodyParts:
     hands: NDArray[np.int64]
     hand_change: Array
     skull: int
-    legs: tuple[tuple[Chain, Chain], ...]
+    legs: tuple[Leg, ...]
 
 
 def body_parts(
@@ -95,10 +110,10 @@ def body_parts(
     for side in SIDES:
         theirs, ours = source.legs.get(side), plan.legs.get(side)
         if theirs and ours and chosen.issuperset(theirs.upper):
-            drive = rig.add_leg(theirs, ours)
+            drive, segments = rig.add_leg(theirs, ours)
             parts.append(Part(f"{side} leg", _joined(theirs), _joined(ours), drive))
             if theirs.lower and ours.lower:
-                legs.append((_bends(theirs), _bends(ours)))
+                legs.append(Leg(_bends(theirs), _bends(ours), segments))
     for side in SIDES:
         theirs, ours = source.arms.get(side), plan.arms.get(side)
         if theirs and ours and chosen.issuperset(theirs.upper):
@@ -143,17 +158,18 @@ class _Rig:
         self.hands: list[int] = []
         self.hand_change: list[Array] = []
 
-    def add_leg(self, theirs: Limb, ours: Limb) -> str:
-        """Let a leg follow a leg; return how it is driven."""
+    def add_leg(self, theirs: Limb, ours: Limb) -> tuple[str, tuple[int, int, int]]:
+        """Let a leg follow a leg; return how it is driven, and its segments as of `Leg`."""
         drive = ABSOLUTE
         if any(_leans(self._rest, chain) for chain in (ours.upper, ours.lower) if chain):
             drive = RELATIVE
-        self._follow(theirs, ours, drive, self._upright)
-        if ours.end and theirs.end:
-            foot = self._add(ours.end, theirs.end[0], theirs.end[-1])
+        last, foot = self._follow(theirs, ours, drive, self._upright), -1
+        if ours.end:
+            ends = theirs.end or (theirs.lower or theirs.upper)[-1:]
+            foot = self._add(ours.end, ends[0], ends[-1])
             self._is_free[foot] = True
-            self._along[foot] = _direction(self._upright, theirs.end)
-        return drive
+            self._along[foot] = _direction(self._upright, ends)
+        return drive, (last - 1, last, foot)
 
     def add_arm(
         self,
@@ -347,8 +363,10 @@ def _joined(limb: Limb) -> Chain:
     return tuple(chain)
 
 
-def _bends(limb: Limb) -> Chain:
-    return limb.upper[0], limb.lower[0], limb.lower[-1]
+def _bends(limb: Limb) -> tuple[int, int, int, int]:
+    """Hip, knee, ankle and toes; without toes the ankle twice."""
+    ankle = limb.lower[-1]
+    return limb.upper[0], limb.lower[0], ankle, limb.end[-1] if limb.end else ankle
 
 
 def _direction(points: Array, chain: Chain) -> Array:

@@ -1,0 +1,173 @@
+"""Keeps a body that is driven limb by limb on its feet: planted, flat, and on the floor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from devices.skeleton import Skeleton
+from runtime.driving.body_parts import Leg
+from runtime.driving.performer import HIGHEST_SOLE, Pose
+from solvers.retarget.clearance import clearance
+from solvers.retarget.foot_contacts import FootContacts, FootContactsState
+from solvers.retarget.foot_lock import FootLock, FootLockState
+from solvers.retarget.sole_pitch import SolePitch, SolePitchState
+from solvers.retarget.two_bone_ik import two_bone_turns
+from solvers.skeleton.quaternions import multiply
+
+Array = NDArray[np.float64]
+Place = Callable[[Array], Array]
+"""Takes points (..., 3) [m] from one space to another."""
+
+_STILL = 1e-6  # [m] a foot that is off by less is in its place
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class FootingState:
+    """The states of the parts of a `Footing` between two frames."""
+
+    contacts: FootContactsState
+    lock: FootLockState
+    soles: SolePitchState
+
+
+class Footing:
+    """The feet of a character with F legs that are driven.
+
+    Args:
+        performer: the performer's skeleton.
+        upright: (J, 3) [m] the performer standing upright, turned as the character faces.
+        nodes: (K, 3) [m] the character's nodes at rest.
+        legs: the legs that correspond.
+        body: joints of trunk, arms and legs, which may rest on the floor too.
+    """
+
+    def __init__(
+        self,
+        performer: Skeleton,
+        upright: Array,
+        nodes: Array,
+        legs: Sequence[Leg],
+        body: Sequence[int],
+    ) -> None:
+        rest = performer.rest_positions
+        self._legs = legs
+        self._body = np.array(body, dtype=np.int64)
+        self._parts = np.array([leg.source[2:] for leg in legs]).reshape(-1, 2)
+        self._has_toes = np.array([leg.source[2] != leg.source[3] for leg in legs], dtype=np.bool_)
+        self._joints = np.array([leg.target[:3] for leg in legs]).reshape(-1, 3)
+        self._points = np.array([leg.target[2:] for leg in legs]).reshape(-1, 2)
+        self._segments = np.array([leg.segments for leg in legs]).reshape(-1, 3)
+        lengths = [_length(nodes, leg.target[:3]) for leg in legs]
+        theirs = [_length(rest, leg.source[:3]) for leg in legs]
+        self._stature = float(np.ptp(rest[:, 1]))
+        low = rest[:, 1].min() - np.clip(rest[:, 1].min(), 0.0, HIGHEST_SOLE)
+        self._contacts = FootContacts(
+            rest[self._parts, 1] - low, float(np.mean(theirs)) if legs else 1.0
+        )
+        self._lock = FootLock(np.array(lengths))
+        ours = nodes[self._points[:, 1]] - nodes[self._points[:, 0]]
+        standing = upright[self._parts[:, 1]] - upright[self._parts[:, 0]]
+        ratio = float(np.mean(lengths)) / max(float(np.mean(theirs)), 1e-9) if legs else 1.0
+        standing = np.where(self._has_toes[:, None], standing, ours / ratio)
+        self._soles = SolePitch(ours, standing, self._has_toes)
+
+    def watch(self, pose: Pose) -> None:
+        """Find out which parts of the performer's feet stand."""
+        if len(self._legs):
+            self._contacts.update(pose.seen[self._parts], pose.time)
+
+    def turn_soles(self, joints: Array, left: Array, time: float, given: Array) -> None:
+        """Put the rotations of the feet into `given` (S, 4), those of the segments.
+
+        Args:
+            joints: (J, 3) [m] the performer, turned as the character faces.
+            left: (3,) the body's left.
+            time: [s]
+            given: (S, 4) is changed.
+        """
+        feet = self._segments[:, 2]
+        if not len(feet):
+            return
+        ways = joints[self._parts[:, 1]] - joints[self._parts[:, 0]]
+        forward = np.cross(left, (0.0, 1.0, 0.0))
+        ways[~self._has_toes] = forward
+        heights, stands = self._contacts.heights[:, 0], self._contacts.stands[:, 0]
+        turns = self._soles.turns(ways, left, heights, stands, time)
+        real = feet >= 0
+        given[feet[real]] = turns[real]
+
+    def plant(
+        self,
+        pose: Pose,
+        nodes: tuple[Array, Array],
+        left: Array,
+        given: Array,
+        *,
+        performer_on_stage: Place,
+        on_stage: Place,
+        off_stage: Place,
+    ) -> bool:
+        """Put the rotations that keep the feet planted into `given` (S, 4).
+
+        Args:
+            pose: of the performer.
+            nodes: positions (K, 3) [m] and rotations (K, 4) of the character without it.
+            left: (3,) the body's left, about which knees bend.
+            given: (S, 4) is changed.
+            performer_on_stage: takes the performer's joints to the stage.
+            on_stage, off_stage: take the character's nodes to the stage, and back.
+
+        Returns:
+            Whether any leg has to be bent.
+        """
+        if not len(self._legs):
+            return False
+        positions, rotations = nodes
+        goals = self._lock.goals(
+            on_stage(positions[self._joints[:, 0]]),
+            on_stage(positions[self._points]),
+            performer_on_stage(pose.seen[self._parts]),
+            self._contacts.stands,
+            pose.time,
+        )
+        if not np.abs(self._lock.offsets).max() > _STILL:
+            return False
+        axes = np.tile(left, (len(self._legs), 1))
+        turns = two_bone_turns(positions[self._joints], off_stage(goals), axes)
+        for bone in range(2):
+            own = rotations[self._joints[:, bone]]
+            given[self._segments[:, bone]] = multiply(turns[:, bone], own)
+        return True
+
+    def clearance(self, pose: Pose) -> float:
+        """How far the performer is above the floor [m]; 0 for one whose feet are not known."""
+        if not len(self._legs):
+            return 0.0
+        floor = float(self._contacts.floors.min())
+        return clearance(self._contacts.heights, pose.seen[self._body], floor, self._stature)
+
+    def reset(self) -> None:
+        """Forget the frames before."""
+        self._contacts.reset()
+        self._lock.reset()
+        self._soles.reset()
+
+    def snapshot(self) -> FootingState:
+        """Return what the next frame depends on."""
+        return FootingState(
+            self._contacts.snapshot(), self._lock.snapshot(), self._soles.snapshot()
+        )
+
+    def restore(self, state: FootingState) -> None:
+        """Go back to a snapshot."""
+        self._contacts.restore(state.contacts)
+        self._lock.restore(state.lock)
+        self._soles.restore(state.soles)
+
+
+def _length(points: Array, chain: tuple[int, ...]) -> float:
+    return float(np.linalg.norm(np.diff(points[list(chain)], axis=0), axis=1).sum())
