@@ -165,16 +165,15 @@ def pose(
 ) -> NDArray[np.float64]:
     """Joints (J, 3) of the performer, some turned by rotation vectors [rad] from rest."""
     rest = BODY.rest_positions
-    positions, rotations = rest.copy(), [Rotation.identity()] * len(rest)
+    positions, rotations = rest.copy(), np.tile(np.eye(3), (len(rest), 1, 1))
     for joint in BODY.order:
         parent = int(BODY.parents[joint])
-        own = Rotation.from_rotvec((turns or {}).get(BODY.names[joint], (0.0, 0.0, 0.0)))
         if parent >= 0:
-            positions[joint] = positions[parent] + rotations[parent].apply(
-                rest[joint] - rest[parent]
-            )
-            own = rotations[parent] * own
-        rotations[joint] = own
+            rotations[joint] = rotations[parent]
+            positions[joint] = positions[parent] + rotations[parent] @ (rest[joint] - rest[parent])
+        own = (turns or {}).get(BODY.names[joint])
+        if own is not None:
+            rotations[joint] @= Rotation.from_rotvec(own).as_matrix()
     return turned(positions, heading, positions[HIPS]) + np.asarray(moved, dtype=np.float64)
 
 
