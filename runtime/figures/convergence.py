@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
@@ -46,7 +47,8 @@ class Curves:
         return int(below[0]) if len(below) else None
 
 
-def measure() -> list[Curves]:
+@cache
+def measure() -> tuple[Curves, ...]:
     """Return the curves of four constraints on a round bar with handles at both ends."""
     vertices, faces = revolved(np.linspace(0.0, 4.0, 32), np.full(32, 0.5), 14)
     x = vertices[:, 0]
@@ -61,9 +63,9 @@ def measure() -> list[Curves]:
         "squash": ends - right * pull,
         "stretch": ends + right * pull,
     }
-    return [
+    return tuple(
         _curves(name, vertices, faces, handles, targets) for name, targets in constraints.items()
-    ]
+    )
 
 
 def _curves(name: str, vertices: Floats, faces: Ints, handles: Ints, targets: Floats) -> Curves:
@@ -72,11 +74,11 @@ def _curves(name: str, vertices: Floats, faces: Ints, handles: Ints, targets: Fl
     rigid = ArapSolver(vertices, faces, handles, groups=groups)
     scaled = SquashStretchSolver(vertices, faces, handles, groups=groups)
     shares: dict[str, Floats] = {}
-    for title, ours, iterations, step, energy in (
-        ("ARAP", rigid, 1, plain.rigid_step, plain.rigid_energy),
-        ("squash and stretch", scaled, 2, plain.scaled_step, plain.scaled_energy),
+    for title, ours, iterations, cells in (
+        ("ARAP", rigid, 1, plain.rigid_cells),
+        ("squash and stretch", scaled, 2, plain.scaled_cells),
     ):
-        slow = _plain_energies(plain.cold_start(targets), step, energy)
+        slow = _plain_energies(plain, cells, plain.cold_start(targets))
         # Two iterations of ours are one of the shape state, which has this energy, and one pose.
         ours.solve(targets, 0)
         fast = [ours.energy]
@@ -89,19 +91,18 @@ def _curves(name: str, vertices: Floats, faces: Ints, handles: Ints, targets: Fl
     return Curves(name, shares)
 
 
-def _plain_energies(
-    x: Floats, step: Callable[[Floats], Floats], energy: Callable[[Floats], float]
-) -> Floats:
-    energies = [energy(x)]
-    for _ in range(FRAMES):
-        x = step(x)
-        energies.append(energy(x))
-    for _ in range(_SETTLED - FRAMES):
-        x = step(x)
-    return np.array([*energies, energy(x)])
+def _plain_energies(plain: PlainSolver, cells: Callable[[Floats], Floats], x: Floats) -> Floats:
+    """Energies of the start, of the first `FRAMES` iterations, and of the settled surface."""
+    energies = []
+    for iteration in range(_SETTLED + 1):
+        matrices = cells(x)
+        if iteration <= FRAMES or iteration == _SETTLED:
+            energies.append(plain.energy(x, matrices))
+        x = plain.global_step(x, matrices)
+    return np.array(energies)
 
 
-def draw(curves: list[Curves], size: tuple[int, int]) -> Image.Image:
+def draw(curves: Sequence[Curves], size: tuple[int, int]) -> Image.Image:
     """Draw the curves: a panel for each constraint, two in a row, and a legend below."""
     width, height = _FINER * size[0], _FINER * size[1]
     picture = Image.new("RGB", (width, height), _PAPER)
@@ -156,7 +157,7 @@ def _stroke(
     pen.line(points, fill=_COLOURS[method], width=wide, joint="curve")
 
 
-def table(curves: list[Curves]) -> list[str]:
+def table(curves: Sequence[Curves]) -> list[str]:
     """Return lines of text: the iterations of each method to each share."""
     heads = "".join(f"{f'{share:.0%}':>6}" for share in SHARES)
     lines = [f"{'iterations to':34}{heads}"]

@@ -46,16 +46,11 @@ class PlainSolver:
         """
         x = self._rest.copy()
         x[self._handles] = targets
-        return self._surface(x, np.tile(np.eye(3), (len(x), 1, 1)))
+        return self.global_step(x, np.tile(np.eye(3), (len(x), 1, 1)))
 
     def rigid_step(self, x: Floats) -> Floats:
         """Do a local and a global step. Sorkine and Alexa 2007, eqs. (6) and (9)."""
-        return self._surface(x, self._rotations(x))
-
-    def scaled_step(self, x: Floats) -> Floats:
-        """Do a local and a global step of the shape state. Celikcan et al. 2015, eqs. (5-9)."""
-        R = self._rotations(x)
-        return self._surface(x, self._scales(x, R)[:, None, None] * R)
+        return self.global_step(x, self.rigid_cells(x))
 
     def whole_volume_step(self, x: Floats) -> Floats:
         """Do a local and a global step under one hard constraint: the whole volume is kept.
@@ -77,24 +72,25 @@ class PlainSolver:
 
     def rigid_energy(self, x: Floats) -> float:
         """Return the energy with the best rotations. Sorkine and Alexa 2007, eq. (7)."""
-        return self._energy(x, self._rotations(x))
-
-    def scaled_energy(self, x: Floats) -> float:
-        """Return the energy with the best rotations and scales. Celikcan et al. 2015, eq. (4)."""
-        R = self._rotations(x)
-        return self._energy(x, self._scales(x, R)[:, None, None] * R)
+        return self.energy(x, self.rigid_cells(x))
 
     def _summed(self, terms: Floats) -> Floats:
         flat: Floats = self._sum @ terms.reshape(len(terms), -1)
         return flat.reshape(-1, *terms.shape[1:])
 
-    def _rotations(self, x: Floats) -> Floats:
+    def rigid_cells(self, x: Floats) -> Floats:
+        """Return each vertex's best rotation (N, 3, 3). Sorkine and Alexa 2007, eq. (6)."""
         moved = self._weights[:, None] * (x[self._tails] - x[self._heads])
         S = self._summed(moved[:, :, None] * self._edges[:, None, :])
         U, _, Vt = np.linalg.svd(S)
         U[:, :, 2] *= np.sign(np.linalg.det(U @ Vt))[:, None]
         R: Floats = U @ Vt
         return R
+
+    def scaled_cells(self, x: Floats) -> Floats:
+        """Return each vertex's best rotation and scale (N, 3, 3). Celikcan et al., eqs. (5-7)."""
+        R = self.rigid_cells(x)
+        return self._scales(x, R)[:, None, None] * R
 
     def _scales(self, x: Floats, R: Floats) -> Floats:
         turned = np.einsum("eij,ej->ei", R[self._tails], self._edges)
@@ -103,7 +99,8 @@ class PlainSolver:
         below = self._summed(self._weights * np.einsum("ei,ei->e", turned, turned))
         return above / np.maximum(below, 1e-300)
 
-    def _surface(self, x: Floats, matrices: Floats) -> Floats:
+    def global_step(self, x: Floats, matrices: Floats) -> Floats:
+        """Return the surface (N, 3) that suits the cells' matrices best. Eq. (9) of both papers."""
         mean = 0.5 * (matrices[self._tails] + matrices[self._heads])
         pull = self._weights[:, None] * np.einsum("eij,ej->ei", mean, self._edges)
         moved = x.copy()
@@ -111,7 +108,8 @@ class PlainSolver:
         moved[self._free] = self._factor.solve(b)
         return moved
 
-    def _energy(self, x: Floats, matrices: Floats) -> float:
+    def energy(self, x: Floats, matrices: Floats) -> float:
+        """Return the energy with the cells' matrices (N, 3, 3). Celikcan et al. 2015, eq. (4)."""
         shaped = np.einsum("eij,ej->ei", matrices[self._tails], self._edges)
         error = x[self._tails] - x[self._heads] - shaped
         return float(self._weights @ np.einsum("ei,ei->e", error, error))

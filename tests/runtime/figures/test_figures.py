@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -21,13 +22,13 @@ from solvers.squash_stretch import SquashStretchSolver
 
 
 @pytest.fixture(scope="module")
-def curves() -> list[convergence.Curves]:
+def curves() -> Sequence[convergence.Curves]:
     return convergence.measure()
 
 
 @pytest.mark.parametrize("energy", ["ARAP", "squash and stretch"])
 def test_ours_needs_no_more_iterations_than_the_plain_equations(
-    curves: list[convergence.Curves], energy: str
+    curves: Sequence[convergence.Curves], energy: str
 ):
     never = convergence.FRAMES + 1
     for curve in curves:
@@ -41,7 +42,7 @@ def test_ours_needs_no_more_iterations_than_the_plain_equations(
     )
 
 
-def test_energies_fall_and_the_table_tells_when(curves: list[convergence.Curves]):
+def test_energies_fall_and_the_table_tells_when(curves: Sequence[convergence.Curves]):
     for curve in curves:
         for method, shares in curve.shares.items():
             assert (np.diff(shares) < 1e-9).all(), (curve.name, method)
@@ -52,7 +53,7 @@ def test_energies_fall_and_the_table_tells_when(curves: list[convergence.Curves]
     assert len(lines) == 1 + 4 * len(curves)
 
 
-def test_the_curves_are_drawn_in_their_colours(curves: list[convergence.Curves]):
+def test_the_curves_are_drawn_in_their_colours(curves: Sequence[convergence.Curves]):
     picture = convergence.draw(curves, (640, 400))
     assert picture.size == (640, 400)
     colours = {colour for _, colour in picture.getcolors(1_000_000)}
