@@ -13,9 +13,15 @@ from hypothesis import HealthCheck, settings
 
 from devices.errors import InputError
 from runtime.render.context import headless_context, release_headless
+from tests.thorough import examples
 
 # Nothing may depend on the clock: how long an example takes is no fault.
-settings.register_profile("bunraku", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.register_profile(
+    "bunraku",
+    deadline=None,
+    max_examples=examples(100),
+    suppress_health_check=[HealthCheck.too_slow],
+)
 settings.load_profile("bunraku")
 
 SHARED = Path(__file__).resolve().parents[1].parent / "shared" / "data"

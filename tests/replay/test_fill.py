@@ -12,6 +12,7 @@ from hypothesis.extra.numpy import arrays
 
 from devices.skeleton import Skeleton, SkeletonFrame
 from replay.fill import Filler, turn
+from tests.thorough import examples
 
 # root at the origin, elbow 1 m along +X, hand 1 m further along +X; the child index is smaller
 # than its parent's on purpose.
@@ -154,7 +155,7 @@ def turned(start: np.ndarray, end: np.ndarray, weight: float) -> np.ndarray:
     return out
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 @given(
     arrays(
         np.float64,

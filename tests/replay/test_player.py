@@ -15,6 +15,7 @@ from replay.playback import playback_of
 from replay.player import EveryFrame, FrameTiming, Player, RealTime
 from replay.recorded_stream import RecordedStream
 from replay.recording import Recording
+from tests.thorough import examples
 
 POINT = Skeleton(("point",), np.array([-1]), np.zeros((1, 3)))
 
@@ -192,7 +193,7 @@ def test_a_closed_player_has_ended() -> None:
     assert player.poll() == []
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=examples(200), deadline=None)
 @given(
     st.booleans(),
     st.booleans(),

@@ -13,6 +13,7 @@ from solvers.retarget.abstraction import abstract
 from solvers.retarget.source_limbs import simplify
 from solvers.skeleton.forward_kinematics import SkeletonPose
 from solvers.skeleton.tree import Tree, extend_to_leaf
+from tests.thorough import examples
 
 FRONT = np.eye(3)
 SQUID_ARMS = np.radians([0, 45, 90, 135, 180, 225, 270, 315])
@@ -83,7 +84,7 @@ def test_a_body_drives_a_body_limb_by_limb_and_the_spine_too():
     }
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=examples(25), deadline=None)
 @given(st.integers(0, 10_000))
 def test_a_noisy_body_with_spurs_still_takes_the_natural_match(seed):
     rng = np.random.default_rng(seed)
@@ -314,7 +315,7 @@ def test_node_numbers_do_not_matter():
     assert sorted(renamed) == sorted(after[0].pairs)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(
     st.integers(0, 100_000),
     st.integers(1, 80),

@@ -14,6 +14,7 @@ from devices.osc.messages import BUNDLE, elements, read_packet
 from devices.osc.vmc_decoder import MARIONETTE, PERFORMER, VmcDecoder
 from devices.skeleton import SkeletonFrame
 from tests.devices.vmc_sender import HUMAN, at, bones, bundle, message, ok, root, slime
+from tests.thorough import examples
 
 POSE = (0.1, 1.0, 0.2, 0.0, 0.0, 0.0, 1.0)
 ODD = (float("nan"), float("inf"), -0.0, 0.0, 0.5, 2.0, 999.0, 1e30, 1e-40)
@@ -65,7 +66,7 @@ def contents(frames: Sequence[SkeletonFrame]) -> list[object]:
     ]
 
 
-@settings(deadline=None, max_examples=300)
+@settings(deadline=None, max_examples=examples(300))
 @given(st.data(), st.sampled_from((MARIONETTE, PERFORMER)))
 def test_a_known_layout_changes_nothing(data: st.DataObject, role: str) -> None:
     knowing, strict = VmcDecoder(role), VmcDecoder(role)

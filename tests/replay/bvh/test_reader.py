@@ -17,6 +17,7 @@ from replay.bvh.reader import read_bvh, recognises_bvh
 from replay.formats import read_recording
 from replay.recording import Recording
 from tests.replay.bvh.sound_recording import assert_sound
+from tests.thorough import examples
 
 FINGER = """HIERARCHY
 ROOT base
@@ -318,7 +319,9 @@ def some_mutation(data: bytes, chance: random.Random) -> bytes:
 
 
 @settings(
-    max_examples=300, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=examples(300),
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 @given(st.integers(0, 2**32))
 def test_any_damage_gives_a_clear_error_or_a_sound_recording(tmp_path: Path, seed: int) -> None:

@@ -26,6 +26,7 @@ from devices.kinect.joints import (
 from devices.skeleton import Skeleton
 from replay.formats import HEAD_BYTES, formats, read_recording, recognise
 from replay.recording import Recording
+from tests.thorough import examples
 
 MSR_ORDER = (  # as the data set's own drawings join them, counted from 1: 20-3, 1-8-10-12, ...
     *("ShoulderLeft", "ShoulderRight", "ShoulderCenter", "Spine", "HipLeft", "HipRight"),
@@ -232,7 +233,9 @@ def test_what_is_no_recording_is_not_taken_for_one(tmp_path: Path, content: byte
 
 
 @settings(
-    max_examples=250, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture]
+    max_examples=examples(250),
+    deadline=None,
+    suppress_health_check=[HealthCheck.function_scoped_fixture],
 )
 @given(st.integers(0, 2**32))
 def test_any_damage_gives_a_clear_error_or_a_sound_recording(tmp_path: Path, seed: int) -> None:

@@ -19,6 +19,7 @@ from replay.leap import reader as leap_reader
 from replay.leap.lz_string import lz_pieces
 from replay.leap.reader import read_leap, recognises_leap
 from replay.recording import Recording
+from tests.thorough import examples
 
 
 def hand(number: int, side: str | None, x: float, confidence: float = 1.0) -> dict[str, Any]:
@@ -102,7 +103,7 @@ def lz_compress(text: str) -> bytes:
     return lz_base64([*numbers, (2, size.bit_length())])
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100), deadline=None)
 @given(st.text(st.sampled_from("ab{}\u0159\u65e5"), max_size=300))
 def test_lz_string_is_unpacked(text: str) -> None:
     assert "".join(lz_pieces(lz_compress(text))) == text
@@ -376,7 +377,7 @@ def test_real_recordings_cut_anywhere_never_surprise(shared: Path, tmp_path: Pat
             readable(cut)
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100), deadline=None)
 @given(st.data())
 def test_mutated_messages_never_surprise(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject

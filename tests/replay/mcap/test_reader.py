@@ -24,6 +24,7 @@ from replay.mcap.reader import McapReader, read_mcap
 from replay.mcap.record_reader import walk
 from replay.mcap.writer import McapWriter
 from replay.recording import Recording
+from tests.thorough import examples
 
 ARM = Skeleton(("shoulder", "elbow", "hand"), np.array([-1, 0, 1]), np.eye(3))
 
@@ -294,7 +295,7 @@ def test_a_chunk_that_claims_more_than_any_machine_can_hold_is_passed_over(
     assert f"at byte {chunks[1]}" in recording.notes[0]
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 @given(st.data())
 def test_mutated_bytes_never_surprise(
     tmp_path_factory: pytest.TempPathFactory, finished: bytes, data: st.DataObject

@@ -11,12 +11,13 @@ from hypothesis import strategies as st
 from mcap.reader import make_reader
 
 from replay.mcap.record_writer import CHUNK_BYTES, McapRecordWriter
+from tests.thorough import examples
 
 SIZES = st.sampled_from((0, 1, 5_000, CHUNK_BYTES - 1, CHUNK_BYTES, 3 * CHUNK_BYTES))
 
 
 @given(st.lists(st.tuples(SIZES, st.integers(1, 2), st.booleans()), max_size=8))
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=examples(40))
 def test_messages_of_any_size_come_back(wishes: list[tuple[int, int, bool]]) -> None:
     """In chunks that end where they are full or handed on, longer and shorter than the last."""
     sent = []

@@ -18,6 +18,7 @@ from devices.mediapipe.joints import HAND_LANDMARKS, POSE_LANDMARKS
 from replay.formats import read_recording
 from replay.mediapipe.reader import read_mediapipe, recognises_mediapipe
 from replay.recording import Recording
+from tests.thorough import examples
 
 WIDTH, HEIGHT, FRAMES = 320, 240, 4
 
@@ -311,7 +312,7 @@ def test_other_tables_are_not_taken_for_landmarks() -> None:
         assert not recognises_mediapipe(Path("a.csv"), head)
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 @given(st.data())
 def test_mutated_files_never_surprise(
     tmp_path_factory: pytest.TempPathFactory, data: st.DataObject

@@ -22,6 +22,7 @@ from runtime.characters.file_to_stage import (
     placed,
 )
 from runtime.characters.formats.mesh_file import read_mesh_file
+from tests.thorough import examples
 
 QUARTER = Rotation.from_euler("y", 90, degrees=True).as_matrix()
 
@@ -32,7 +33,7 @@ def read(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(-8, 8))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 def test_a_placement_stands_in_the_middle_and_can_be_undone(seed: int, exponent: float) -> None:
     random = np.random.default_rng(seed)
     points = (random.normal(size=(30, 3)) * random.uniform(0.01, 1, 3) + 5.0) * 10.0**exponent

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from scipy.sparse import csr_array
 
 from runtime.characters.weld import first_occurrences, weld, welded_weights
+from tests.thorough import examples
 
 
 def test_welding_joins_seams_and_keeps_first_appearances() -> None:
@@ -23,7 +24,7 @@ def test_welding_keeps_fine_detail_apart() -> None:
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(-6, 6))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=examples(30), deadline=None)
 def test_welding_undoes_splitting_at_any_scale_and_order(seed: int, exponent: float) -> None:
     random = np.random.default_rng(seed)
     points = random.normal(size=(40, 3)) * 10.0**exponent

@@ -16,6 +16,7 @@ from runtime.conditioning.reception import Reception
 from runtime.conditioning.switches import SWITCHES, Conditioning
 from tests.runtime.snapshots import arrays, digest
 from tests.runtime.stick_figures import BODY, T_POSE, pose
+from tests.thorough import examples
 
 SHOW = builtin_recording("show")
 STEP = 1 / 30
@@ -62,7 +63,7 @@ def said(frames: Sequence[ConditionedFrame | SkeletonFrame]) -> list[str]:
 SWITCHED = st.fixed_dictionaries({name: st.booleans() for name in SWITCHES})
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=examples(25), deadline=None)
 @given(st.integers(0, 2**32), st.integers(1, 30), st.integers(0, 30), SWITCHED, SWITCHED)
 def test_a_conditioner_put_back_does_the_same_again(
     seed: int, before: int, after: int, first: dict[str, bool], then: dict[str, bool]
@@ -88,7 +89,7 @@ def test_a_conditioner_put_back_does_the_same_again(
         assert digest(state) == kept, "nothing writes into a state"
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=examples(25), deadline=None)
 @given(st.integers(0, 2**32), st.integers(0, 40), st.integers(0, 40), st.booleans(), st.booleans())
 def test_a_reception_put_back_does_the_same_again(
     seed: int, before: int, after: int, order: bool, identities: bool

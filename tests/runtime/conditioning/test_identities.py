@@ -12,6 +12,7 @@ from runtime.conditioning.identities import MEMORY, Identities
 from runtime.conditioning.reception import MOST_AT_ONCE, Reception
 from runtime.conditioning.switches import for_live
 from tests.runtime.stick_figures import BODY, T_POSE, pose
+from tests.thorough import examples
 
 STEP = 1 / 30
 STANDING = pose(T_POSE)
@@ -102,7 +103,7 @@ def test_two_who_pass_each_other_while_nobody_sees_them_are_told_apart() -> None
     assert numbers(identities, at(back, 0.85, 7), at(back, 0.15, 8)) == [1, 2]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40), deadline=None)
 @given(st.lists(st.permutations([5, 6, 7]), min_size=2, max_size=25), st.booleans())
 def test_numbers_are_steady_when_the_sensors_are_shuffled(
     names: list[list[int]], one_at_a_time: bool

@@ -38,9 +38,10 @@ from tests.runtime.conditioning.conditioned_frames import (
     show,
 )
 from tests.runtime.stick_figures import BODY, T_POSE, pose
+from tests.thorough import examples
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(
     arrays(
         np.float64,
@@ -67,7 +68,7 @@ def test_a_frame_of_another_skeleton_is_refused(switches: Conditioning) -> None:
             Conditioner(BODY, switches).condition(other)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40), deadline=None)
 @given(arrays(np.float64, (len(BODY.names), 3), elements=st.floats(-5.0, 5.0)))
 def test_the_mirror_twice_is_as_before(positions: np.ndarray) -> None:
     partner = body_anatomy(BODY).partner

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from devices.skeleton import SkeletonFrame
 from runtime.conditioning.timeline import JUMP, MOST_PERFORMERS, Timeline
+from tests.thorough import examples
 
 STEP = 1 / 30
 
@@ -93,7 +94,7 @@ def test_all_performers_go_on_after_a_jump() -> None:
     assert timeline.jumps == 1
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=examples(100), deadline=None)
 @given(
     st.lists(
         st.tuples(
@@ -112,7 +113,7 @@ def test_each_performers_time_never_falls(packets: list[tuple[float, int, float]
             newest[performer] = out.time
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=examples(50), deadline=None)
 @given(st.lists(st.integers(0, 29), max_size=30))
 def test_repeating_what_came_changes_nothing(again: list[int]) -> None:
     clean, repeated = Timeline(), Timeline()

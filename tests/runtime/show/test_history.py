@@ -27,6 +27,7 @@ from runtime.show.settings import CharacterSettings, MatchSettings, ShowSettings
 from runtime.show.show import Show
 from tests.runtime.snapshots import arrays, digest
 from tests.runtime.stick_figures import make_figure, record, waving
+from tests.thorough import examples
 
 Script = dict[int, list[tuple[str, float | None]]]
 
@@ -142,7 +143,7 @@ DONE = st.lists(st.one_of(SWITCHED, SET, PRESSED), max_size=2)
 SCRIPT = st.dictionaries(st.integers(0, 30), DONE, max_size=8)
 
 
-@settings(max_examples=25)
+@settings(max_examples=examples(25))
 @given(st.tuples(st.integers(0, 40), SCRIPT), st.tuples(st.integers(1, 30), SCRIPT))
 def test_a_show_put_back_performs_the_same_bytes(
     stage: Stage,

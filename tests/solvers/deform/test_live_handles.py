@@ -12,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from solvers.arap import ArapSolver
 from solvers.deform.handles import group_targets, stretched_turns
+from tests.thorough import examples
 
 
 def tube(rings: int = 40, around: int = 16) -> tuple[np.ndarray, np.ndarray]:
@@ -111,7 +112,7 @@ def test_a_handle_lets_go_smoothly_as_its_weight_falls():
     assert abs(pulled[-1]) < 0.1
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=examples(25), deadline=None)
 @given(st.data())
 def test_any_order_of_holding_and_letting_go_ends_the_same(data: st.DataObject):
     solver = ArapSolver(POINTS, FACES, ENDS, groups=GROUPS)

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from solvers.retarget.abstraction import abstract, find_root
 from solvers.retarget.source_limbs import simplify
 from solvers.skeleton.tree import Tree
+from tests.thorough import examples
 
 
 def grow(*chains):
@@ -125,7 +126,7 @@ def test_a_given_root_is_taken(root):
     )
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(st.integers(0, 10_000), st.integers(2, 60))
 def test_every_sub_tree_is_made_of_disjoint_ways_outward(seed, count):
     rng = np.random.default_rng(seed)
@@ -146,7 +147,7 @@ def test_every_sub_tree_is_made_of_disjoint_ways_outward(seed, count):
     assert set(levels) == set(np.flatnonzero(tree.degree > 2).tolist())
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=examples(30), deadline=None)
 @given(st.integers(0, 10_000))
 def test_node_numbers_do_not_matter(seed):
     rng = np.random.default_rng(seed)

@@ -7,6 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from solvers.retarget.assignment import rank_assignments
+from tests.thorough import examples
 
 
 def by_listing(values, starts):
@@ -24,7 +25,7 @@ def by_listing(values, starts):
     return sorted(found, key=lambda item: -item[0])
 
 
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=examples(80), deadline=None)
 @given(
     st.integers(0, 10_000), st.integers(1, 4), st.lists(st.integers(1, 6), min_size=1, max_size=4)
 )

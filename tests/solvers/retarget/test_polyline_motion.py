@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from solvers.retarget.chain_retargets import ChainRetargets
 from solvers.retarget.polyline_motion import basis_change, map_chain, mean_direction, view_basis
+from tests.thorough import examples
 
 FRONT = np.eye(3)
 
@@ -70,7 +71,7 @@ def test_figure_4_turning_angles_spread_linearly_along_the_bones():
     np.testing.assert_allclose(sampled, expected, atol=1e-12)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(st.integers(0, 100_000), st.integers(1, 6), st.integers(1, 40))
 def test_the_total_turning_survives_any_resampling(seed, bones, samples):
     rng = np.random.default_rng(seed)
@@ -84,7 +85,7 @@ def test_the_total_turning_survives_any_resampling(seed, bones, samples):
     np.testing.assert_allclose(np.linalg.norm(sampled, axis=1), 1.0, atol=1e-12)
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(st.integers(0, 100_000), st.integers(1, 8))
 def test_the_same_sampling_takes_over_the_pose(seed, bones):
     rng = np.random.default_rng(seed)
@@ -100,7 +101,7 @@ def test_the_same_sampling_takes_over_the_pose(seed, bones):
 
 
 @given(st.integers(0, 100_000), st.integers(1, 6), st.integers(1, 20))
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40), deadline=None)
 def test_rest_gives_rest(seed, bones, samples):
     rng = np.random.default_rng(seed)
     source, target = random_polyline(rng, bones), random_polyline(rng, samples)
@@ -159,7 +160,7 @@ def test_a_kick_towards_the_viewer_stays_one_though_the_first_bone_crosses_the_h
     assert abs(tip[0]) < 0.3 * tip[2]
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40), deadline=None)
 @given(st.integers(0, 100_000), st.floats(-3.1, 3.1))
 def test_turning_both_about_the_view_axis_turns_the_result(seed, angle):
     rng = np.random.default_rng(seed)
@@ -174,7 +175,7 @@ def test_turning_both_about_the_view_axis_turns_the_result(seed, angle):
     assert (expected.inv() * found).magnitude().max() < 1e-6
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=examples(30), deadline=None)
 @given(st.integers(0, 100_000))
 def test_what_the_camera_sees_decides_not_where_it_stands(seed):
     rng = np.random.default_rng(seed)

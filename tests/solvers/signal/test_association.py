@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from solvers.signal.association import KNOWN_NAME_BONUS, NEW_COST, associate
+from tests.thorough import examples
 
 
 def test_nobody_is_somebody_new() -> None:
@@ -36,7 +37,7 @@ def test_a_name_outweighs_a_little_distance_only() -> None:
     assert associate(np.array([[1.1 * KNOWN_NAME_BONUS, 0.0]]), same, within).tolist() == [1]
 
 
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 @given(st.integers(1, 4), st.integers(1, 4), st.integers(0, 2**32 - 1))
 def test_no_other_assignment_costs_less(detections: int, known: int, seed: int) -> None:
     random = np.random.default_rng(seed)

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from solvers.signal.one_euro import OneEuroFilter, smoothing_factor
+from tests.thorough import examples
 
 points = arrays(np.float64, (4, 3), elements=st.floats(-10.0, 10.0))
 
@@ -19,7 +20,7 @@ def run(euro: OneEuroFilter, samples: np.ndarray, dt: float) -> np.ndarray:
     return np.array([euro.filter(sample, dt) for sample in samples])
 
 
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=examples(50), deadline=None)
 @given(points, st.floats(1e-4, 10.0))
 def test_a_constant_comes_out_to_the_last_bit(still: np.ndarray, dt: float) -> None:
     np.testing.assert_array_equal(run(OneEuroFilter(), np.array([still] * 20), dt)[-1], still)

@@ -15,6 +15,7 @@ from solvers.signal.floor_plane import FloorFit
 from solvers.signal.one_euro import OneEuroFilter
 from solvers.signal.prediction import Predictor
 from solvers.signal.springs import Springs
+from tests.thorough import examples
 
 Sample = tuple[np.ndarray, float]
 
@@ -45,7 +46,7 @@ def floor(fit: FloorFit, points: np.ndarray, dt: float) -> np.ndarray:
     ],
     ids=["one_euro", "prediction", "floor_plane", "springs"],
 )
-@settings(deadline=None, max_examples=50)
+@settings(deadline=None, max_examples=examples(50))
 @given(before=samples, after=samples, between=samples)
 def test_going_on_from_a_snapshot_gives_the_same_bytes(
     make: Callable[[], Any],

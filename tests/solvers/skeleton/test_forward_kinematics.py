@@ -8,6 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from solvers.skeleton.forward_kinematics import SkeletonPose, pose
 from solvers.skeleton.tree import Tree
+from tests.thorough import examples
 
 STILL = np.array([0.0, 0.0, 0.0, 1.0])
 
@@ -82,7 +83,7 @@ def test_any_node_may_be_the_one_that_stays():
     np.testing.assert_allclose(positions[0], 2 * tree.positions[4] - tree.positions[0], atol=1e-12)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=examples(40), deadline=None)
 @given(st.integers(0, 100_000), st.integers(2, 40))
 def test_bones_keep_their_lengths_and_nodes_ride_rigidly(seed, count):
     rng = np.random.default_rng(seed)

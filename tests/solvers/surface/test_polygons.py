@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from solvers.surface.polygons import triangulate
+from tests.thorough import examples
 
 U = np.array([[0, 0], [3, 0], [3, 3], [2, 3], [2, 1], [1, 1], [1, 3], [0, 3]], dtype=float)
 
@@ -94,7 +95,7 @@ def test_corners_on_a_straight_side_are_kept() -> None:
 
 
 @given(st.integers(4, 40), st.integers(0, 2**32 - 1), st.floats(-6, 6))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=examples(60), deadline=None)
 def test_star_shaped_polygons_are_covered_at_any_scale(
     count: int, seed: int, exponent: float
 ) -> None:

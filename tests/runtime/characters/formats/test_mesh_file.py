@@ -15,6 +15,7 @@ from runtime.characters.character_file import SUFFIXES, read_character
 from runtime.characters.formats.mesh_data import FileMesh
 from runtime.characters.formats.mesh_file import MESH_SUFFIXES, read_mesh_file
 from runtime.characters.palette import linear_from_srgb, palette_color
+from tests.thorough import examples
 
 TETRAHEDRON = np.array([[0.0, 0, 0], [2, 0, 0], [0, 3, 0], [0, 0, 1.5]])
 FACES = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [0, 3, 2]])
@@ -124,7 +125,7 @@ def test_a_file_cut_short_is_refused_or_whole_in_what_is_left(name: str, tmp_pat
 
 
 @given(st.sampled_from(sorted(FILES)), st.binary(max_size=400), st.integers(0, 300))
-@settings(max_examples=120, deadline=None)
+@settings(max_examples=examples(120), deadline=None)
 def test_damaged_files_give_a_mesh_or_an_input_error(
     tmp_path_factory: pytest.TempPathFactory, name: str, noise: bytes, at: int
 ) -> None:

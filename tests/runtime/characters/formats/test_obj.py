@@ -16,6 +16,7 @@ from runtime.characters.character_file import read_character
 from runtime.characters.formats import obj_lines
 from runtime.characters.formats.mesh_file import read_mesh_file
 from tests.runtime.characters.formats.test_mesh_file import written
+from tests.thorough import examples
 
 TRIANGLE = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
@@ -131,7 +132,7 @@ def some_obj(rng: random.Random) -> str:
 @given(
     st.integers(0, 2**32), st.sampled_from(["\n", "\r\n", "\r"]), st.sampled_from([1, 40, 1 << 20])
 )
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=examples(150), deadline=None)
 def test_lines_in_bulk_read_as_lines_one_by_one(seed: int, newline: str, block: int) -> None:
     text = some_obj(random.Random(seed))
     with pytest.MonkeyPatch.context() as patch:

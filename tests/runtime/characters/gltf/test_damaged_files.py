@@ -24,6 +24,7 @@ from tests.runtime.characters.gltf.documents import (
     skinned_bar,
     textured,
 )
+from tests.thorough import examples
 
 
 def test_a_buffer_beside_the_file_is_read(tmp_path: Path) -> None:
@@ -185,7 +186,7 @@ def ways(value: Any) -> list[list[Any]]:
     return [[key, *rest] for key, member in members for rest in [[], *ways(member)]]
 
 
-@settings(max_examples=400, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=examples(400), deadline=None, suppress_health_check=list(HealthCheck))
 @given(data=st.data())
 def test_any_document_reads_or_is_refused(tmp_path: Path, data: st.DataObject) -> None:
     scene = data.draw(st.sampled_from([skinned_bar, lambda: textured(png([[[1, 2, 3, 4]]]))]))()
