@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from devices.skeleton import Skeleton
 from runtime.driving.body_parts import Leg
-from runtime.driving.performer import HIGHEST_SOLE, Pose
+from runtime.driving.performer import Pose
 from solvers.retarget.clearance import clearance
 from solvers.retarget.foot_contacts import FootContacts, FootContactsState
 from solvers.retarget.foot_lock import FootLock, FootLockState
@@ -64,10 +64,7 @@ class Footing:
         lengths = [_length(nodes, leg.target[:3]) for leg in legs]
         theirs = [_length(rest, leg.source[:3]) for leg in legs]
         self._stature = float(np.ptp(rest[:, 1]))
-        low = rest[:, 1].min() - np.clip(rest[:, 1].min(), 0.0, HIGHEST_SOLE)
-        self._contacts = FootContacts(
-            rest[self._parts, 1] - low, float(np.mean(theirs)) if legs else 1.0
-        )
+        self._contacts = FootContacts(rest[self._parts, 1], float(np.mean(theirs)) if legs else 1.0)
         self._lock = FootLock(np.array(lengths))
         ours = nodes[self._points[:, 1]] - nodes[self._points[:, 0]]
         standing = upright[self._parts[:, 1]] - upright[self._parts[:, 0]]

@@ -23,8 +23,8 @@ def clearance(feet: Array, joints: Array, floor: float, stature: float) -> float
     Args:
         feet: (F, 2) [m] of ankles and toes above the height at which they stand: see
             `FootContacts.heights`. F may be 0.
-        joints: (J, 3) [m] the joints of the body; those of the feet may be among them, but none
-            that stays on the floor while the body jumps.
+        joints: (J, 3) [m] the other joints of trunk, head, arms and legs, down to the knees. None
+            of the feet, and none that stays on the floor while the body jumps.
         floor: [m] the height of the floor; see `FootContacts.floors`.
         stature: [m] the height of the performer, standing.
     """

@@ -23,23 +23,27 @@ Records = NDArray[np.void]
 
 # Lengths in leg lengths, speeds in leg lengths a second. Two numbers: to begin, and to end.
 LOW = (0.06, 0.10)
-SLOW = (0.30, 0.60)
+SLOW = (0.25, 0.40)
+NOISE = 1.5  # times the speed that noise alone would show is added to both
+NOISIEST = 0.5  # the most that is added
+QUIETER, NOISIER = 0.3, 4.0  # [s] in which the noise that is measured falls and rises
 HOLD = (0.03, 0.03)  # [s] for how long a change must last
-CERTAIN = 2.0  # times these numbers: a foot this high or fast has left the floor at once
-SMOOTHING = 0.05  # [s] of the velocity
+CERTAIN = 1.4  # times these numbers: a foot this high or fast has left the floor at once
+SMOOTHING = 0.04  # [s] of the velocity
 LONGEST = 0.25  # [s] between two frames: after a longer gap velocities start anew
 FALLING, RISING = 0.15, 0.5  # [s] in which a foot's floor follows a lower foot, a higher slow one
 STEP = 0.09  # a foot that is higher above its floor stands on something else, or not at all
-UNEVEN = (
-    0.15  # the most by which a foot's floor is above the lowest foot's, or above y = 0 at first
-)
+UNEVEN = 0.15  # the most by which a foot's floor is above the lowest foot's
+ALOFT, PATIENCE, DESCENT = 0.04, 0.8, 0.3  # see `_rise_under`; the last two [s]
 
-# Of each part: where it was, its smoothed velocity, whether it stands, and since when it might no
-# longer (or might begin to); NaN for not at all.
+# Of each part: where it was, its velocity as measured and smoothed, the noise [m] of its places,
+# whether it stands, and since when it might no longer (or might begin to); NaN for not at all.
 _PART = np.dtype(
     [
         ("place", np.float64, 3),
+        ("measured", np.float64, 3),
         ("velocity", np.float64, 3),
+        ("noise", np.float64),
         ("since", np.float64),
         ("stands", np.bool_),
     ],
@@ -54,11 +58,13 @@ class FootContactsState:
     Attributes:
         parts: (F, 2) of `_PART`.
         floors: (F,) [m] the floor under each foot.
+        aloft: [s] for how long no foot has been near its floor.
         time: [s] of the newest frame; NaN before the first.
     """
 
     parts: Records
     floors: Array
+    aloft: float
     time: float
 
 
@@ -66,22 +72,25 @@ class FootContacts:
     """Tells ankles and toes that stand on the floor from those that do not.
 
     Args:
-        standing: (F, 2) [m] height of ankle and toes of each foot above the floor while it stands,
-            as in the skeleton's rest pose. A foot without toes has its ankle twice.
+        rest: (F, 2) [m] height of ankle and toes of each foot in the skeleton's rest pose; only
+            their difference counts. A foot without toes has its ankle twice.
         leg: [m] length of the performer's legs.
 
     Attributes:
         heights: (F, 2) [m] of ankles and toes above the height at which they stand; overwritten by
             the next frame.
-        floors: (F,) [m] the floor under each foot; overwritten by the next frame.
+        floors: (F,) [m] the height of each foot's lowest part when it stands; overwritten by the
+            next frame.
     """
 
-    def __init__(self, standing: Array, leg: float) -> None:
-        self._standing = np.array(standing, dtype=np.float64)
+    def __init__(self, rest: Array, leg: float) -> None:
+        self._standing = np.array(rest, dtype=np.float64)
+        self._standing -= self._standing.min(axis=1, keepdims=True)
         self._leg = float(leg)
         self._parts = np.zeros(self._standing.shape, _PART)
         self.heights = np.zeros(self._standing.shape)
         self.floors = np.zeros(len(self._standing))
+        self._aloft = 0.0
         self._time = math.nan
 
     @property
@@ -95,29 +104,43 @@ class FootContacts:
 
     def snapshot(self) -> FootContactsState:
         """Return a copy of what the next frame depends on."""
-        return FootContactsState(self._parts.copy(), self.floors.copy(), self._time)
+        return FootContactsState(self._parts.copy(), self.floors.copy(), self._aloft, self._time)
 
     def restore(self, state: FootContactsState) -> None:
         """Go back to a snapshot of as many feet."""
         self._parts[:], self.floors[:] = state.parts, state.floors
-        self._time = state.time
+        self._aloft, self._time = state.aloft, state.time
 
     def update(self, points: Array, time: float) -> Bools:
         """Take in a frame; return whether ankles and toes (F, 2) stand: `stands`.
 
         Args:
-            points: (F, 2, 3) [m] ankles and toes, the floor near y = 0.
-            time: [s]. If it steps back or leaps ahead, velocities start anew. Frames of the same
-                time count as one.
+            points: (F, 2, 3) [m] ankles and toes. In the first frame the lowest foot is taken to
+                stand.
+            time: [s]; NaN for a frame on its own. If it steps back or leaps ahead, velocities start
+                anew. Frames of the same time count as one.
         """
         dt = time - self._time
-        if math.isnan(self._time):
+        if math.isnan(dt):
+            self._aloft = 0.0
             _begin(self._parts, self.floors, points, self._standing, self._leg)
         elif dt != 0.0:
             _follow(self._parts, points, dt)
         if dt != 0.0:
             _settle_floors(self._parts, self.floors, points, self._standing, self._leg, dt)
-            _decide(self._parts, self.floors, self.heights, points, self._standing, self._leg, time)
+            self._aloft = _rise_under(
+                self.floors, points, self._standing, self._leg, self._aloft, dt
+            )
+            _decide(
+                self._parts,
+                self.floors,
+                self.heights,
+                points,
+                self._standing,
+                self._leg,
+                dt,
+                time,
+            )
         self._time = time
         return self.stands
 
@@ -132,8 +155,8 @@ def _lowest(points: Array, standing: Array, foot: int) -> float:
 
 @kernel
 def _begin(parts: Records, floors: Array, points: Array, standing: Array, leg: float) -> None:
-    """Take the lowest foot to stand, unless it is much too high."""
-    floor = UNEVEN * leg
+    """Take the lowest foot to stand."""
+    floor = np.inf
     for foot in range(len(points)):
         floor = min(floor, _lowest(points, standing, foot))
     for foot in range(len(points)):
@@ -141,8 +164,9 @@ def _begin(parts: Records, floors: Array, points: Array, standing: Array, leg: f
         for part in range(2):
             own = parts[foot, part]
             for k in range(3):
-                own.place[k], own.velocity[k] = points[foot, part, k], 0.0
-            own.since = np.nan
+                own.place[k] = points[foot, part, k]
+                own.velocity[k], own.measured[k] = 0.0, np.nan
+            own.since, own.noise = np.nan, np.nan
             own.stands = points[foot, part, 1] - standing[foot, part] - floor < LOW[0] * leg
 
 
@@ -153,15 +177,33 @@ def _follow(parts: Records, points: Array, dt: float) -> None:
     for foot in range(len(points)):
         for part in range(2):
             own = parts[foot, part]
-            if not known:
-                own.since = np.nan
+            change = 0.0
             for k in range(3):
                 if known:
                     speed = (points[foot, part, k] - own.place[k]) / dt
+                    change += (speed - own.measured[k]) ** 2
+                    own.measured[k] = speed
                     own.velocity[k] += share * (speed - own.velocity[k])
                 else:
-                    own.velocity[k] = 0.0
+                    own.measured[k], own.velocity[k] = np.nan, 0.0
                 own.place[k] = points[foot, part, k]
+            if not known:
+                own.since = np.nan
+            elif not math.isnan(change):
+                _learn_noise(own, dt * math.sqrt(change), dt)
+
+
+@kernel
+def _learn_noise(part: Any, change: float, dt: float) -> None:
+    """Keep the least change of step [m], frame by frame, that has been usual lately.
+
+    A foot that steps changes its steps as well, but stands in between; noise never rests.
+    """
+    if math.isnan(part.noise):
+        part.noise = change
+    else:
+        seconds = QUIETER if change < part.noise else NOISIER
+        part.noise += (1.0 - math.exp(-dt / seconds)) * (change - part.noise)
 
 
 @kernel
@@ -192,6 +234,26 @@ def _settle_floors(
 
 
 @kernel
+def _rise_under(
+    floors: Array, points: Array, standing: Array, leg: float, aloft: float, dt: float
+) -> float:
+    """Let the floor rise under feet that have been off it for longer than a jump lasts.
+
+    Returns:
+        [s] for how long no foot has been near its floor.
+    """
+    above = np.inf
+    for foot in range(len(points)):
+        above = min(above, _lowest(points, standing, foot) - floors[foot])
+    if above < ALOFT * leg or not 0.0 < dt <= LONGEST:
+        return 0.0
+    if aloft > PATIENCE:
+        for foot in range(len(points)):
+            floors[foot] += (1.0 - math.exp(-dt / DESCENT)) * above
+    return aloft + dt
+
+
+@kernel
 def _decide(
     parts: Records,
     floors: Array,
@@ -199,9 +261,12 @@ def _decide(
     points: Array,
     standing: Array,
     leg: float,
+    dt: float,
     time: float,
 ) -> None:
     """Let parts begin or cease to stand once they have been low and slow, or not, for a while."""
+    # The smoothed velocity of a resting point whose places have noise of such a size.
+    shown = NOISE * 0.75 * (1.0 - math.exp(-dt / SMOOTHING)) / (dt * leg) if dt > 0.0 else 0.0
     for foot in range(len(points)):
         for part in range(2):
             own = parts[foot, part]
@@ -210,6 +275,8 @@ def _decide(
             heights[foot, part] = height
             height /= leg
             end = 1 if own.stands else 0
+            if own.noise > 0.0:  # not NaN
+                speed -= min(shown * own.noise, NOISIEST)
             low_and_slow = height < LOW[end] and speed < SLOW[end]
             if low_and_slow == own.stands:
                 own.since = np.nan

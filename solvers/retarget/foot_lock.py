@@ -24,6 +24,7 @@ Records = NDArray[np.void]
 
 # Lengths in leg lengths of the character.
 PLAY = 0.03  # how far a standing foot of the performer drifts before the planted one goes along
+CREEP = 0.012  # [1/s] how fast a planted foot may move to where the leg alone would put it
 FARTHEST = 0.25  # from its place before locking: a foot that is farther off lets go
 HOME = 0.02  # a foot that has let go is planted again when it is this near
 RETURN = 35.0  # [1/s] of the way back: a tenth of it is left after 0.11 s
@@ -59,9 +60,9 @@ class FootLockState:
 class FootLock:
     """Plants feet, and lets them go.
 
-    A planted foot goes along with the performer's once that has drifted by `PLAY`, and no farther
-    than that, so it never slides faster than the performer's. It lets go when it is too far from
-    where the legs alone would put it. From there it goes back smoothly, also in velocity.
+    A planted foot may move as far as the performer's does once that has drifted by `PLAY`, and by
+    `CREEP`, never more. What it may move brings it to where the legs alone would put it. It lets go
+    when it is too far from there. From then on it goes back smoothly, also in velocity.
 
     Args:
         legs: (F,) [m] length of the character's legs from hip to ankle.
@@ -100,7 +101,7 @@ class FootLock:
             performer: (F, 2, 3) [m] the performer's ankles and toes, brought to the stage as the
                 travel of the hips is: turned and scaled.
             stands: (F, 2) whether the performer's ankles and toes stand; see `FootContacts`.
-            time: [s]. If it steps back or leaps ahead, all feet start anew.
+            time: [s]. If it steps back or leaps ahead, or is NaN, all feet start anew.
         """
         dt = time - self._time
         if not 0.0 <= dt <= LONGEST:  # also before the first frame
@@ -163,15 +164,19 @@ def _plant(foot: Any, part: int, points: Array, performer: Array) -> None:
 
 @kernel
 def _stay(foot: Any, point: Array, performer: Array, leg: float, dt: float) -> None:
-    """Keep the planted part in its place, which goes along with the performer's drift."""
+    """Keep the planted part in its place, but for what it may move."""
     x, z = performer[0] - foot.performer[0], performer[2] - foot.performer[1]
     drift = math.hypot(x, z)
+    budget = CREEP * leg * dt
     if drift > PLAY * leg:
         share = 1.0 - PLAY * leg / drift
-        foot.plant[0] += share * x
-        foot.plant[1] += share * z
+        budget += share * drift
         foot.performer[0] += share * x
         foot.performer[1] += share * z
+    x, z = foot.plant[0] - point[0], foot.plant[1] - point[2]
+    share = min(budget / max(math.hypot(x, z), 1e-12), 1.0)
+    foot.plant[0] -= share * x
+    foot.plant[1] -= share * z
     x, z = foot.plant[0] - point[0], foot.plant[1] - point[2]
     if math.hypot(x, z) > FARTHEST * leg:
         foot.part, foot.let_go = NONE, True

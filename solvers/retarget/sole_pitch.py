@@ -77,12 +77,12 @@ class SolePitch:
             left: (3,) the direction to the body's left.
             heights: (F,) [m] of the performer's ankles above the height at which they stand.
             stands: (F,) whether the ankles stand.
-            time: [s]
+            time: [s]; NaN for a frame on its own.
         """
-        if math.isnan(self._time):
+        dt = time - self._time
+        if math.isnan(dt):
             self._feet["planted"], self._feet["level"] = self._elevations, stands
-            self._time = time
-        dt = max(time - self._time, 0.0)
+        dt = dt if dt > 0.0 else 0.0
         self._time = time
         out = np.empty((len(feet), 4))
         known = self._rest, self._lengths, self._toes
@@ -115,8 +115,8 @@ def _tilt(
         if not toes[i]:
             pitch *= 1.0 - foot.level
         # The toes do not reach below the floor: an ankle that is low has no room under it.
-        room = min(max(heights[i], 0.0) / max(lengths[i], 1e-9), 1.0)
-        pitch = max(pitch, -math.asin(room))
+        room = max(heights[i], 0.0) / max(lengths[i], 1e-9)
+        pitch = max(pitch, math.asin(max(math.sin(foot.planted) - room, -1.0)) - foot.planted)
         yaw = math.atan2(-aside_z, aside_x) - math.atan2(rest[i, 0], rest[i, 2])
         level = (0.0, math.sin(0.5 * yaw), 0.0, math.cos(0.5 * yaw))
         sine = math.sin(-0.5 * pitch)

@@ -14,7 +14,7 @@ NO_FEET = np.zeros((0, 2))
 
 
 def jump(height: float) -> float:
-    joints = np.array([[0.0, 0.9 + height, 0.0], [0.0, 0.1 + height, 0.0]])
+    joints = np.array([[0.0, 0.9 + height, 0.0], [0.0, 0.5 + height, 0.0]])
     return clearance(np.full((2, 2), height), joints, 0.0, TALL)
 
 

@@ -80,6 +80,44 @@ def test_a_foot_that_is_seen_too_high_stands_nevertheless() -> None:
     assert (stands[..., 0] == known)[sure].mean() > 0.99
 
 
+@pytest.mark.parametrize("rate", [30.0, 120.0])
+def test_noise_of_a_centimetre_does_not_hide_a_foot_that_stands(rate: float) -> None:
+    rng = np.random.default_rng(3)
+    times = irregular(rate, rng)
+    points = walk(times)
+    points += rng.normal(scale=0.01, size=points.shape)
+    stands, known = told(points, times), truth(times, 0.17)
+    sure = (known >= 0) & (times > 2.0)[:, None]
+    assert (stands[..., 1] == known)[sure].mean() > 0.93
+
+
+def test_the_rest_pose_need_not_stand() -> None:
+    """Some files have the first frame as their rest pose: here one foot is far above the other."""
+    times = np.arange(0.0, 6.0, 1.0 / 30.0)
+    points = walk(times)
+    lifted = FootContacts(STANDING + np.array([[0.3], [0.0]]), LEG)
+    for p, t, stands in zip(points, times, told(points, times), strict=True):
+        np.testing.assert_array_equal(lifted.update(p, t), stands)
+
+
+@pytest.mark.parametrize("rises", [0.25, 0.6])
+def test_who_stays_up_stands_on_something(rises: float) -> None:
+    """Up on a box, which a jump's time later is the floor; and down again."""
+    times = np.arange(0.0, 6.0, 1.0 / 60.0)
+    up = rises * (np.clip((times - 1.0) / 0.3, 0.0, 1.0) - np.clip((times - 4.0) / 0.3, 0.0, 1.0))
+    contacts, heights = FootContacts(STANDING, LEG), []
+    for time, height in zip(times, up, strict=True):
+        points = np.zeros((2, 2, 3))
+        points[..., 1] = STANDING + height
+        contacts.update(points, time)
+        heights.append(contacts.heights.min())
+    heights = np.array(heights)
+    assert heights[(times > 1.4) & (times < 1.7)] == pytest.approx(rises, abs=0.05)
+    assert heights[(times > 3.5) & (times < 4.0)].max() < 0.04
+    assert np.diff(heights)[(times > 1.4)[1:] & (times < 4.0)[1:]].min() > -0.1 * rises
+    assert np.abs(heights[times > 5.5]).max() < 0.01
+
+
 def test_tiptoe_stands_on_the_toes_alone() -> None:
     times = np.arange(0.0, 3.0, 1.0 / 60.0)
     points = np.zeros((len(times), 2, 2, 3))
@@ -124,6 +162,16 @@ def test_time_that_stands_steps_back_or_leaps() -> None:
     for time in (0.0, 100.0):  # elsewhere in the recording: no speed can be told
         points[..., 0] += 3.0
         assert contacts.update(points, time).all()
+
+
+def test_a_frame_on_its_own_has_no_time() -> None:
+    contacts = FootContacts(STANDING, LEG)
+    points = np.zeros((2, 2, 3))
+    points[..., 1] = STANDING
+    for time in (np.nan, 0.0, np.nan, np.nan):
+        points += 0.7
+        assert contacts.update(points, time).all()
+        np.testing.assert_allclose(contacts.heights, 0.0, atol=1e-12)
 
 
 def test_going_on_from_a_snapshot_tells_the_same() -> None:

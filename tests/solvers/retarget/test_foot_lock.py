@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solvers.retarget.foot_lock import FARTHEST, PLAY, FootLock
+from solvers.retarget.foot_lock import CREEP, FARTHEST, PLAY, FootLock
 from tests.runtime.snapshots import digest, leaves
 
 LEG = 0.9
@@ -41,15 +41,24 @@ def test_a_foot_in_the_air_is_left_alone() -> None:
 def test_a_planted_foot_stays_where_it_came_down(stands: np.ndarray) -> None:
     zs = np.linspace(0.0, 0.15, 60)
     goals = perform(FootLock([LEG]), zs, [stands] * 60)
-    np.testing.assert_allclose(goals[:, 2], 0.0, atol=1e-15)
+    assert 0.0 < goals[-1, 2] <= CREEP * LEG * 59 / RATE + 1e-12
+    assert np.abs(np.diff(goals[:, 2])).max() <= CREEP * LEG / RATE + 1e-12
     np.testing.assert_array_equal(goals[:, 1], 0.1)  # its height is left alone
+
+
+def test_a_planted_foot_creeps_home() -> None:
+    """What little a foot may move while it stands brings it to where the leg would put it."""
+    zs = np.r_[np.linspace(0.0, 0.03, 30), np.full(600, 0.03)]
+    goals = perform(FootLock([LEG]), zs, [FLAT] * len(zs))[:, 2]
+    assert goals[30] < 0.01
+    assert goals[-1] == 0.03
 
 
 def test_it_goes_back_smoothly() -> None:
     zs = np.linspace(0.0, 0.4, 121)  # 0.2 m/s
     goals = perform(FootLock([LEG]), zs, [FLAT] * 60 + [NEITHER] * 61)[:, 2]
     speeds = np.diff(goals) * RATE
-    assert speeds[:59] == pytest.approx(np.zeros(59), abs=1e-12)
+    assert np.abs(speeds[:59]).max() <= CREEP * LEG + 1e-9
     gaps = zs - goals
     assert (np.diff(gaps[60:]) < 1e-4).all()  # it catches up with the free foot
     assert np.abs(gaps[60 + 8 :]).max() < 0.1 * gaps[59]
@@ -78,7 +87,7 @@ def test_rolling_from_the_whole_foot_to_the_toes_moves_nothing() -> None:
         stands = FLAT if i < 25 else TIPTOE
         goal = lock.goals(HIP, points, points, stands[None], i / RATE)[0]
         out.append(points[0, 1, 2] + goal[2] - points[0, 0, 2])
-    np.testing.assert_allclose(out, 0.17, atol=1e-12)
+    np.testing.assert_allclose(out, 0.17, atol=0.012)
 
 
 def test_it_goes_along_with_a_performer_who_slides_and_never_faster() -> None:
@@ -86,8 +95,9 @@ def test_it_goes_along_with_a_performer_who_slides_and_never_faster() -> None:
     performer = np.cumsum(np.r_[np.zeros(30), np.full(60, 0.004), rng.normal(0, 0.002, 60)])
     goals = perform(FootLock([LEG]), performer * 1.2, [FLAT] * 150, performer)[:, 2]
     steps, theirs = np.abs(np.diff(goals)), np.abs(np.diff(performer))
-    assert (steps <= theirs + 1e-12).all()
-    assert goals[89] == pytest.approx(performer[89] - PLAY * LEG, abs=1e-9)
+    assert (steps <= theirs + CREEP * LEG / RATE + 1e-12).all()
+    slid = performer[89] - goals[89]
+    assert 0.0 <= slid <= PLAY * LEG
 
 
 def test_a_foot_that_is_too_far_off_lets_go_and_is_planted_again() -> None:
@@ -96,7 +106,7 @@ def test_a_foot_that_is_too_far_off_lets_go_and_is_planted_again() -> None:
     assert np.abs(goals - zs).max() <= FARTHEST * LEG + 1e-9
     assert goals[-1] > FARTHEST * LEG
     assert np.abs(np.diff(goals)).max() < 0.06  # and does not jump
-    np.testing.assert_allclose(np.diff(goals)[-30:], 0.0, atol=1e-12)
+    assert np.abs(np.diff(goals)[-30:]).max() <= CREEP * LEG / RATE + 1e-12  # planted
 
 
 def test_a_goal_is_always_within_reach() -> None:
@@ -107,7 +117,7 @@ def test_a_goal_is_always_within_reach() -> None:
         points = straight + np.array([0.0, 0.0, 0.007 * i])
         hips = HIP + np.array([0.0, 0.0, 0.007 * i])
         goal = lock.goals(hips, points, straight, FLAT[None], i / RATE)
-        assert goal[0, 2] == pytest.approx(0.0, abs=1e-15)
+        assert 0.0 <= goal[0, 2] <= CREEP * LEG * i / RATE + 1e-12
         assert np.linalg.norm(goal - hips) <= LEG + 1e-12
 
 
