@@ -116,14 +116,17 @@ class BoundSkeleton:
     def skin(self) -> Skin:
         """The nodes that each vertex of the deformed surface follows, and their weights.
 
-        A node carries what lies beyond it, as the character's own skeleton is rooted. Found when
-        it is first asked for, which takes up to a second without weights from a file.
+        A node carries what lies beyond it, seen from the hips of the body's plan, or else from
+        the character's own root. Without weights from a file they are found when they are first
+        asked for, which takes up to a second.
         """
         character, proxy = self._character, self._proxy
         if character.weights is not None:
             return skin_of_weights(character.weights[proxy.kept])
-        skeleton = character.skeleton
-        return skin_of_heat(proxy.vertices, proxy.faces, skeleton.parents, skeleton.rest_positions)
+        tree = character.skeleton.tree
+        if character.plan is not None:
+            tree = tree.rerooted(character.plan.hips)
+        return skin_of_heat(proxy.vertices, proxy.faces, tree.parents, tree.positions)
 
     @cached_property
     def _skinned_surface(self) -> SkinnedSurface:
