@@ -110,6 +110,7 @@ class BodyDriver:
         self._trunk = UPRIGHT
         self._twists = np.zeros(len(parts.rig.near))
         self._nodes = skeleton.rest_nodes
+        skeleton.skinned(self._nodes)  # finds the skin now, so that no frame waits for it
 
     def _neutral(self, upright: Array) -> Array:
         """The orientations (3, 4) of the performer's trunk while it stands upright."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
-SKIN_FIRMNESS = 0.05  # measured: docs/deformation.md
+SKIN_FIRMNESS = 0.02  # measured: see docs/deformation.md
 
 
 @dataclass(frozen=True, slots=True)
