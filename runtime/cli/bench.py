@@ -1,4 +1,4 @@
-"""`bunraku bench`: measures how fast the parts of the program are on this machine."""
+"""`bunraku bench`: measures how fast the program is, and how well its characters follow."""
 
 from __future__ import annotations
 
@@ -10,11 +10,12 @@ from typing import Any
 
 from devices.errors import InputError
 from runtime.cli.arguments import positive
+from runtime.show.settings import DRIVES
 
 HELP = "measure the speed of this machine"
 
 DEFAULT = ("arap", "table1", "hold", "dense", "tick", "match", "spacetime")
-LONG = ("clips", "soak", "kill", "latency")  # only when named
+LONG = ("clips", "likeness", "soak", "kill", "latency")  # only when named
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         metavar="NAME",
         help="arap, table1, hold, dense, tick, match or spacetime (default: all of these); or "
-        "clips, soak, kill or latency, which take long",
+        "clips, likeness, soak, kill or latency, which take long",
     )
     parser.add_argument(
         "--seconds", type=positive, metavar="N", help="soak: seconds of show (default 3600)"
@@ -40,13 +41,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         type=Path,
         metavar="FILE",
-        help="clips: play this recording instead of the built-in motions; may be repeated",
+        help="clips, likeness: play this recording, not a built-in one; may be repeated",
     )
     parser.add_argument(
         "--character",
         action="append",
         metavar="C",
-        help="clips: use this character instead of the built-in ones; may be repeated",
+        help="clips, likeness: use this character, not the built-in ones; may be repeated",
+    )
+    parser.add_argument(
+        "--drive", choices=DRIVES, help="likeness: how the characters follow (default auto)"
+    )
+    parser.add_argument(
+        "--sheets",
+        type=Path,
+        metavar="DIR",
+        help="likeness: draw moments of each pair into a picture in this folder",
     )
     parser.add_argument(
         "--json", type=Path, metavar="FILE", help="also write the figures to this file"
@@ -73,16 +83,19 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _arguments(options: argparse.Namespace) -> dict[str, Any]:
-    """The arguments of the benchmark; each option belongs to one benchmark only."""
+    """The arguments of the benchmark; each option belongs to some benchmarks only."""
     asked = {
-        "seconds": (options.seconds, "soak"),
-        "real_time": (options.real_time or None, "soak"),
-        "load": (options.load or None, "latency"),
-        "recording": (options.recording, "clips"),
-        "character": (options.character, "clips"),
+        "seconds": (options.seconds, ("soak",)),
+        "real_time": (options.real_time or None, ("soak",)),
+        "load": (options.load or None, ("latency",)),
+        "recording": (options.recording, ("clips", "likeness")),
+        "character": (options.character, ("clips", "likeness")),
+        "drive": (options.drive, ("likeness",)),
+        "sheets": (options.sheets, ("likeness",)),
     }
-    for name, (value, owner) in asked.items():
-        if value is not None and options.name != owner:
+    for name, (value, owners) in asked.items():
+        if value is not None and options.name not in owners:
             option = name.replace("_", "-")
-            raise InputError(f"--{option} is for `bunraku bench {owner}`; leave it out")
+            there = " and ".join(f"`bunraku bench {owner}`" for owner in owners)
+            raise InputError(f"--{option} is for {there}; leave it out")
     return {name: value for name, (value, _) in asked.items() if value is not None}

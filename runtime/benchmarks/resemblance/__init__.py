@@ -1,0 +1,1 @@
+"""What is measured of a character beside the performer who drives it."""
