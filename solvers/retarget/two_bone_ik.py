@@ -21,6 +21,8 @@ from solvers.kernels.quaternion import Quaternion, Vector, between, multiply, no
 Array = NDArray[np.float64]
 
 SOFT = 0.02  # of the limb's length: how far before full reach a limb starts to lag behind its goal
+GIVE = 0.015  # of the limb's length: how much nearer a straight limb's goal may be without a bend
+NEARLY = 0.95  # of the limb's length: from here on a limb counts as more and more straight
 _SENSE = 0.02  # of the limb's length: knees that stand out less bend about the given axis
 _NOTHING = 1e-9  # of the limb's length
 
@@ -128,7 +130,8 @@ def within_reach(hip: Vector, ankle: Vector, goal: Vector, length: float) -> Vec
 
     A limb that gets straight is led there softly: a goal farther off than the limb reaches is
     raised (or lowered, above the hip). Where even the level distance is too far, it comes nearer.
-    The limb's own ankle is always within reach, and so are goals no farther off.
+    A goal that is too near for a straight limb is lowered a little: a knee bends by 8 degrees for
+    the first hundredth of the limb's length. The limb's own ankle stays as it is.
 
     Args:
         hip, ankle: [m] the limb before.
@@ -137,8 +140,14 @@ def within_reach(hip: Vector, ankle: Vector, goal: Vector, length: float) -> Vec
     """
     wish = _minus(goal, hip)
     own, far = _length(_minus(ankle, hip)), _length(wish)
-    soft = soft_reach(far, own, length)
-    if far <= soft:
+    if far <= own:
+        straight = (own / length - NEARLY) / (1.0 - NEARLY)
+        steep = wish[1] * wish[1] / max(far * far, _NOTHING)
+        give = GIVE * length * min(max(straight, 0.0), 1.0) * steep
+        soft = far + give * (1.0 - math.exp((far - own) / max(give, _NOTHING * length)))
+    else:
+        soft = soft_reach(far, own, length)
+    if soft == far:
         return goal
     level = math.sqrt(wish[0] * wish[0] + wish[2] * wish[2])
     if level >= soft:

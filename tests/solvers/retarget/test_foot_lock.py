@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from solvers.retarget.foot_lock import CREEP, FARTHEST, PLAY, FootLock
+from solvers.retarget.two_bone_ik import GIVE
 from tests.runtime.snapshots import digest, leaves
 
 LEG = 0.9
@@ -43,7 +44,8 @@ def test_a_planted_foot_stays_where_it_came_down(stands: np.ndarray) -> None:
     goals = perform(FootLock([LEG]), zs, [stands] * 60)
     assert 0.0 < goals[-1, 2] <= CREEP * LEG * 59 / RATE + 1e-12
     assert np.abs(np.diff(goals[:, 2])).max() <= CREEP * LEG / RATE + 1e-12
-    np.testing.assert_array_equal(goals[:, 1], 0.1)  # its height is left alone
+    assert np.abs(goals[:, 1] - 0.1).max() < GIVE * LEG  # its height is left alone
+    assert (goals[:30, 1] == 0.1).all()  # and wholly so while the leg is bent
 
 
 def test_a_planted_foot_creeps_home() -> None:

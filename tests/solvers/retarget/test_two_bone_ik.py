@@ -8,7 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from solvers.retarget.two_bone_ik import soft_reach, two_bone_turns, within_reach
+from solvers.retarget.two_bone_ik import (
+    GIVE,
+    NEARLY,
+    soft_reach,
+    two_bone_turns,
+    within_reach,
+)
 
 LEFT = np.array([1.0, 0.0, 0.0])
 STRAIGHT = np.array([[0.0, 1.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.1, 0.0]])
@@ -108,5 +114,19 @@ def test_a_goal_within_reach_keeps_its_place_on_the_ground(
     assert np.linalg.norm(out) <= length + 1e-12
     if np.hypot(goal[0], goal[2]) < length - 0.05:
         np.testing.assert_array_equal(out[[0, 2]], goal[[0, 2]])
-    if np.linalg.norm(goal) <= np.linalg.norm(ankle):
-        np.testing.assert_array_equal(out, goal)
+    own, far = np.linalg.norm(ankle), np.linalg.norm(goal)
+    if far <= own:
+        assert far <= np.linalg.norm(out) + 1e-9 <= max(own, far + GIVE * length) + 2e-9
+        if own <= NEARLY * length:
+            np.testing.assert_array_equal(out, goal)
+    same = within_reach((0.0, 0.0, 0.0), tuple(ankle), tuple(ankle), length)
+    np.testing.assert_allclose(same, ankle, atol=1e-12)
+
+
+def test_a_straight_leg_whose_goal_is_a_little_too_near_hardly_bends() -> None:
+    leg = STRAIGHT - STRAIGHT[0]
+    near = (0.0, -0.894, 0.0)  # 6 mm of 0.9 m
+    goal = within_reach((0.0, 0.0, 0.0), tuple(leg[2]), near, 0.9)
+    bent = moved(leg, np.array(near))[1, 2]
+    assert moved(leg, np.array(goal))[1, 2] < 0.5 * bent
+    assert goal[1] > -0.9
