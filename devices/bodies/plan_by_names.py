@@ -9,7 +9,7 @@ import numpy as np
 
 from devices.bodies.body_plan import SIDES, BodyPlan, Chain, Limb
 from devices.bodies.joint_labels import first_of, label_joints
-from devices.bodies.joint_names import FINGERS, BodyPart, Kind, Side
+from devices.bodies.joint_names import FINGERS, BodyPart, Kind, Side, part_of_name
 from devices.bodies.joint_names import Limb as LimbName
 from devices.bodies.limb_segments import arm_segments, bend_between, leg_segments, neck_and_head
 from devices.skeleton import Skeleton
@@ -18,6 +18,7 @@ _ARM = (Kind.UPPER_ARM, Kind.LOWER_ARM, Kind.HAND)
 _LEG = (Kind.UPPER_LEG, Kind.LOWER_LEG, Kind.FOOT, Kind.TOES)
 _WINGS = ((Kind.WING,), (Kind.FIN,))
 _SPINE = (Kind.SPINE, Kind.CHEST)
+_FEWEST_BONES = 6  # three of each of two limbs
 _SHORT = 1e-3  # of the skeleton's size: joints this close have no direction between them
 _AS_LONG = 0.5  # of a leg: another one on the same side that is longer is one of a spider's
 
@@ -52,6 +53,34 @@ def plan_by_names(skeleton: Skeleton) -> BodyPlan | None:
         leg_word="hind leg" if arm_word == "foreleg" else "leg",
     )
     return plan if plan.is_body and _apart(plan) else None
+
+
+def plan_by_declaration(skeleton: Skeleton, bones: Mapping[str, int]) -> BodyPlan | None:
+    """Return the plan of a body whose file says which of its joints are a humanoid's bones.
+
+    The joints' own names tell only what no humanoid has, a tail, and where bones end.
+
+    Args:
+        skeleton: the body.
+        bones: joints by the names of a humanoid's bones, as VRM has them: "leftUpperArm".
+
+    Returns:
+        None where the bones are not enough for a plan.
+    """
+    if len(bones) < _FEWEST_BONES:
+        return None
+    words = {joint: bone for bone, joint in reversed([*bones.items()]) if bone.isalpha()}
+    names = [
+        f"{name}.{joint}" if (part := part_of_name(name)) and _beyond(part) else f"#{joint}"
+        for joint, name in enumerate(skeleton.names)
+    ]
+    for joint, bone in words.items():
+        names[joint] = bone
+    return plan_by_names(Skeleton(tuple(names), skeleton.parents, skeleton.rest_positions))
+
+
+def _beyond(part: BodyPart) -> bool:
+    return part.tip or part.kind is Kind.TAIL
 
 
 def _apart(plan: BodyPlan) -> bool:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,6 +61,7 @@ class Character:
         surface: for drawing.
         file_to_stage: (4, 4) takes file coordinates to stage coordinates: rotation, uniform scale,
             translation.
+        humanoid: nodes that the file declares to be bones of a humanoid, by VRM's names for them.
         plan: the parts of its body, of the skeleton's nodes; None where no body is recognised.
         notes: guesses and repairs, one short line each.
     """
@@ -71,6 +73,7 @@ class Character:
     weights: csr_array | None
     surface: Surface
     file_to_stage: NDArray[np.float64]
+    humanoid: Mapping[str, int] = field(default_factory=dict)
     plan: BodyPlan | None = None
     notes: tuple[str, ...] = ()
 

@@ -79,7 +79,8 @@ def _from_rig(path: Path) -> Character:
     rig = None
     if model.skeleton is not None and model.weights is not None:
         rig = model.skeleton, model.weights
-    return _standing(path, mesh, weld(mesh.vertices), rotation, rig)
+    character = _standing(path, mesh, weld(mesh.vertices), rotation, rig)
+    return replace(character, humanoid=model.humanoid)
 
 
 def _standing(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from devices.bodies.plan_by_names import plan_by_names
+from devices.bodies.plan_by_names import plan_by_declaration, plan_by_names
 from devices.errors import InputError
 from runtime.characters.builtin import BUILTIN, builtin_character
 from runtime.characters.character import Character
@@ -42,5 +42,7 @@ def load_character(name: str | Path) -> Character:
 
 
 def _planned(character: Character) -> Character:
-    """The character with the plan of its body, where one is recognised."""
-    return replace(character, plan=plan_by_names(character.skeleton))
+    """The character with the plan of its body, where one is declared or recognised."""
+    skeleton = character.skeleton
+    declared = plan_by_declaration(skeleton, character.humanoid)
+    return replace(character, plan=declared or plan_by_names(skeleton))

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from devices.skeleton import Skeleton
 from runtime.characters.character import Material
 from runtime.characters.formats.mesh_data import MeshError, plain_material
 from runtime.characters.gltf.file import GltfFile
+from runtime.characters.gltf.humanoid import humanoid_bones
 from runtime.characters.gltf.joints import Rig, build_rig, with_connections
 from runtime.characters.gltf.material import MaterialReader
 from runtime.characters.gltf.mesh import MeshPart, read_parts
@@ -40,6 +42,7 @@ class GltfModel:
         skeleton: of the file's joints, or None if it has no rig.
         weights: (M, K) of the skeleton's K joints, rows sum to 1; None without a skeleton.
         faces_backward: the character faces -Z, as VRM 0.x has it, instead of +Z.
+        humanoid: the joints that the file declares to be bones of a humanoid, by VRM's names.
         notes: omissions and guesses, one short line each.
     """
 
@@ -52,6 +55,7 @@ class GltfModel:
     skeleton: Skeleton | None
     weights: csr_array | None
     faces_backward: bool
+    humanoid: Mapping[str, int] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
 
@@ -77,15 +81,17 @@ def _read(path: Path) -> GltfModel:
         return _dressed(file, scene, joints)
     model = _surface(parts, look, faces_backward="VRM" in _extensions(file), notes=notes)
     if joints:
-        return _rigged(model, _rig(file, scene, parts, joints), scene, parts)
-    joints = _humanoid_joints(file)
-    if not joints:
+        bones, faults = _declared(file)
+        model = replace(model, notes=(*model.notes, *faults))
+        return _rigged(model, _rig(file, scene, parts, joints), scene, parts, bones)
+    bones = humanoid_bones(file)
+    if not bones:
         return model
-    rig = _rig(file, scene, parts, joints)
+    rig = _rig(file, scene, parts, list(bones.values()))
     if not _spans(rig.skeleton, model.file_vertices):
         note = "its humanoid bones lie outside its mesh and no skin binds them: left out"
         return replace(model, notes=(*model.notes, note))
-    return _rigged(model, rig, scene, parts)
+    return _rigged(model, rig, scene, parts, bones)
 
 
 def _extensions(file: GltfFile) -> frozenset[str]:
@@ -102,22 +108,15 @@ def _skin_joints(file: GltfFile, parts: list[MeshPart]) -> list[int]:
     return list(dict.fromkeys(joint for some in joints for joint in some))
 
 
-def _humanoid_joints(file: GltfFile) -> list[int]:
-    """The nodes that a VRM file, 0.x or 1.0, lists as humanoid bones."""
-    count = len(file.entries("nodes"))
-    new = file.document.extension("VRMC_vrm")
-    old = file.document.extension("VRM")
-    if new is not None:
-        humanoid = new.child("humanoid")
-        named = None if humanoid is None else humanoid.child("humanBones")
-        bones = [] if named is None else [named.child(name) for name in named.fields]
-        return [bone.whole("node", below=count) for bone in bones if bone is not None]
-    humanoid = None if old is None else old.child("humanoid")
-    if humanoid is None:
-        return []
-    # VRM 0.x writes -1 for a bone that the model does not have.
-    present = [bone for bone in humanoid.children("humanBones") if bone.fields.get("node") != -1]
-    return [bone.whole("node", below=count) for bone in present]
+def _declared(file: GltfFile) -> tuple[dict[str, int], tuple[str, ...]]:
+    """The nodes of the humanoid's bones; none and a note where their declaration is damaged.
+
+    A skin moves the character without them.
+    """
+    try:
+        return humanoid_bones(file), ()
+    except MeshError as error:
+        return {}, (f"its humanoid bones are left out: {error}",)
 
 
 def _rig(file: GltfFile, scene: Scene, parts: list[MeshPart], joints: list[int]) -> Rig:
@@ -154,7 +153,9 @@ def _spans(skeleton: Skeleton, vertices: Array) -> bool:
     return bool(inside.all() and np.linalg.norm(np.ptp(rest, axis=0)) > 0.25 * size)
 
 
-def _rigged(model: GltfModel, rig: Rig, scene: Scene, parts: list[MeshPart]) -> GltfModel:
+def _rigged(
+    model: GltfModel, rig: Rig, scene: Scene, parts: list[MeshPart], bones: Mapping[str, int]
+) -> GltfModel:
     """The model with its skeleton and weights for every vertex; unchanged for a single joint."""
     if len(rig.skeleton.names) < 2:
         return replace(model, notes=(*model.notes, "its joints stand at one place: left out"))
@@ -183,7 +184,14 @@ def _rigged(model: GltfModel, rig: Rig, scene: Scene, parts: list[MeshPart]) -> 
     if loose:
         notes = (*notes, f"{loose} parts without a joint follow the nearest one")
     weights = csr_array(vstack(blocks, format="csr"))
-    return replace(model, skeleton=rig.skeleton, weights=weights, notes=notes)
+    humanoid = _joints_of(bones, rig)
+    return replace(model, skeleton=rig.skeleton, weights=weights, humanoid=humanoid, notes=notes)
+
+
+def _joints_of(bones: Mapping[str, int], rig: Rig) -> dict[str, int]:
+    """The joint of each bone, instead of its node; without those that are no joints."""
+    joints = {name: int(rig.joint_of[node]) for name, node in bones.items()}
+    return {name: joint for name, joint in joints.items() if joint >= 0}
 
 
 def _surface(
@@ -221,7 +229,8 @@ def _surface(
 
 def _dressed(file: GltfFile, scene: Scene, joints: list[int]) -> GltfModel:
     """A rig without a mesh, with a wooden figure as its body."""
-    joints = joints or _humanoid_joints(file)
+    bones, faults = _declared(file) if joints else (humanoid_bones(file), ())
+    joints = joints or list(bones.values())
     if not joints:
         raise MeshError("it holds neither triangles nor a rig; export it with its mesh")
     rig = _rig(file, scene, [], joints)
@@ -238,5 +247,6 @@ def _dressed(file: GltfFile, scene: Scene, joints: list[int]) -> GltfModel:
         skeleton=rig.skeleton,
         weights=weights,
         faces_backward="VRM" in _extensions(file),
-        notes=("the file holds a rig without a mesh: a wooden figure is its body",),
+        humanoid=_joints_of(bones, rig),
+        notes=("the file holds a rig without a mesh: a wooden figure is its body", *faults),
     )

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from runtime.characters.open_character import load_character
 from tests.runtime.characters.gltf.documents import (
     TRIANGLE,
     Document,
@@ -142,3 +143,79 @@ def test_humanoid_bones_beside_the_mesh_are_no_rig_of_it(tmp_path: Path) -> None
     model = read(vrm(old=False, reach=0.2), tmp_path, ".vrm")
     assert model.skeleton is None
     assert "humanoid" in model.notes[0]
+
+
+BODY = {
+    "hips": ("", [0, 1.0, 0]),
+    "spine": ("hips", [0, 0.2, 0]),
+    "chest": ("spine", [0, 0.2, 0]),
+    "head": ("chest", [0, 0.2, 0]),
+    **{
+        f"{side}{bone}": (
+            above if above in ("hips", "chest") else f"{side}{above}",
+            [sign * x, y, 0],
+        )
+        for side, sign in (("left", 1), ("right", -1))
+        for bone, above, x, y in (
+            ("UpperArm", "chest", 0.2, 0.1),
+            ("LowerArm", "UpperArm", 0.3, 0),
+            ("Hand", "LowerArm", 0.3, 0),
+            ("UpperLeg", "hips", 0.1, 0),
+            ("LowerLeg", "UpperLeg", 0, -0.5),
+            ("Foot", "LowerLeg", 0, -0.5),
+        )
+    },
+}
+
+
+def declared_body(*, old: bool, called: dict[str, str]) -> Document:
+    """A VRM file whose nodes have other names than the humanoid bones that they are."""
+    scene = Document()
+    size = np.array([[-0.8, 0, 0], [0.8, 0, 0], [0, 1.7, 0]])
+    scene.node(mesh=scene.mesh(size))
+    number = {bone: index for index, bone in enumerate(BODY, start=1)}
+    for bone, (_, offset) in BODY.items():
+        below = [number[child] for child, (above, _) in BODY.items() if above == bone]
+        scene.node(name=called[bone], translation=offset, children=below)
+    if old:
+        bones = [{"bone": bone, "node": index} for bone, index in number.items()]
+        scene.document["extensions"] = {"VRM": {"humanoid": {"humanBones": bones}}}
+    else:
+        named = {bone: {"node": index} for bone, index in number.items()}
+        scene.document["extensions"] = {"VRMC_vrm": {"humanoid": {"humanBones": named}}}
+    return scene
+
+
+@pytest.mark.parametrize("old", [True, False])
+@pytest.mark.parametrize("naming", ["nameless", "misleading"])
+def test_what_a_vrm_file_declares_beats_the_names_of_its_nodes(
+    tmp_path: Path, old: bool, naming: str
+) -> None:
+    bones = list(BODY)
+    called = {bone: f"node_{number}" for number, bone in enumerate(bones)}
+    if naming == "misleading":
+        called = dict(zip(bones, reversed(bones), strict=True))
+    scene = declared_body(old=old, called=called)
+    character = load_character(scene.save(tmp_path / "body.vrm"))
+    plan = character.plan
+    assert plan is not None
+    names = character.skeleton.names
+    for side, arm in plan.arms.items():
+        wanted = [called[f"{side}{bone}"] for bone in ("UpperArm", "LowerArm", "Hand")]
+        assert [names[joint] for joint in arm.chain] == wanted
+    for side, leg in plan.legs.items():
+        wanted = [called[f"{side}{bone}"] for bone in ("UpperLeg", "LowerLeg", "Foot")]
+        assert [names[joint] for joint in leg.chain] == wanted
+    assert len(plan.arms) == len(plan.legs) == 2
+    assert [names[joint] for joint in plan.trunk] == [called[b] for b in ("hips", "spine", "chest")]
+
+
+def test_a_damaged_declaration_does_not_spoil_a_skin(tmp_path: Path) -> None:
+    scene = skinned_bar()
+    scene.document["extensions"] = {
+        "VRMC_vrm": {"humanoid": {"humanBones": {"hips": {"node": 999}}}}
+    }
+    model = read(scene, tmp_path, ".vrm")
+    assert model.skeleton is not None
+    assert not model.humanoid
+    assert "humanoid bones are left out" in model.notes[-1]
