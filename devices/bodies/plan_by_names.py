@@ -235,7 +235,8 @@ class _Labels:
         hands = self._own((Kind.HAND, *FINGERS), side, self._tree.subtree(outer), tips=True)
         paths = [self._tree.chain(outer, joint) for joint in hands]
         shared = [nodes[0] for nodes in zip(*paths, strict=False) if len(set(nodes)) == 1]
-        return shared[-1] if len(shared) > 1 else wrist
+        carrier = shared[-1] if len(shared) > 1 else wrist
+        return wrist if self._is(carrier, Kind.LOWER_ARM) else carrier
 
     def _end(self, joint: int, kinds: Sequence[Kind], side: Side) -> Chain:
         """From the last known joint of a limb to the end of hand or foot; empty for none."""

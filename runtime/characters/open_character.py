@@ -11,6 +11,7 @@ from runtime.characters.builtin import BUILTIN, builtin_character
 from runtime.characters.character import Character
 from runtime.characters.character_file import SUFFIXES, read_character
 from runtime.characters.parallel_bones import split_parallel_bones
+from runtime.characters.sheet import is_sheet
 from runtime.characters.side_view import turned_to_best_side
 
 
@@ -43,6 +44,8 @@ def load_character(name: str | Path) -> Character:
 
 def _planned(character: Character) -> Character:
     """The character with the plan of its body, where one is declared or recognised."""
+    if is_sheet(character.vertices, character.faces):
+        return character
     skeleton = character.skeleton
     declared = plan_by_declaration(skeleton, character.humanoid)
     return replace(character, plan=declared or plan_by_names(skeleton))

@@ -43,7 +43,8 @@ class JointTurns:
             rest = self._performer.rest_positions
             self._fitted = fit_rest_turn(self._performer.parents, rest, pose.seen, pose.rotations)
             if self._fitted is None:
-                return turns
+                nothing = np.zeros(len(rest), dtype=np.bool_)
+                self._fitted = RestTurn(np.array([0.0, 0.0, 0.0, 1.0]), nothing)
         own = pose.rotations[self._joints]
         known = (self._joints >= 0) & self._fitted.is_usable[self._joints]
         known &= np.isfinite(own).all(axis=1)
