@@ -98,6 +98,8 @@ class BodyDriver:
         )
         self._rest: Rest | None = None
         self._ratio = self._size_ratio(upright)
+        # Who sits before a camera, or lends one arm only, does not move the whole.
+        self._goes_along = len(parts.legs) == len(SIDES)
         self._hips = plan.hips
         body = {joint for part in parts.parts for joint in part.source}
         body -= {joint for leg in parts.legs for joint in leg.source[2:]}
@@ -148,10 +150,11 @@ class BodyDriver:
         rest, rig = self._rest, self._parts.rig
         if rest is None:
             return self._skeleton.at_rest
-        joints = pose.facing(self._facing)
+        heading = pose.heading if self._goes_along else rest.heading
+        joints = turned(pose.seen, self._facing - heading, pose.hips)
         self._trunk = trunk_turns(joints, self._parts.trunk, self._upright, self._trunk)
         rotations, positions = np.empty((len(rig.order), 4)), np.empty((len(rig.order), 3))
-        own = self._joint_turns.turns(pose)
+        own = self._joint_turns.turns(pose, heading)
         given = self._given(own[:-1])
         if own[-1].any():
             self._trunk[2] = own[-1]
@@ -159,7 +162,7 @@ class BodyDriver:
         left = rotate(self._trunk[0], self._left)
         self._footing.turn_soles(joints, left, pose.time, given)
         pose_limbs(rig, joints, self._trunk, given, self._twists, rotations, positions)
-        path = self._path(pose, rest)
+        path = self._path(pose, rest, heading)
         if self._footing.plant(
             pose,
             (positions, rotations),
@@ -182,17 +185,17 @@ class BodyDriver:
         given[known] = multiply(hands[known], self._parts.hand_change[known])
         return given
 
-    def _path(self, pose: Pose, rest: Rest) -> Path:
+    def _path(self, pose: Pose, rest: Rest, heading: float) -> Path:
         """Where the whole is: the hips travel as the performer's, in lengths of the legs."""
         if self._origin is None:
             self._origin = pose.hips[[0, 2]]
         return Path(
-            turn=pose.heading - rest.heading,
+            turn=heading - rest.heading,
             about=self._skeleton.tree.positions[self._skeleton.root],
             hips=self._parts.rig.rest[self._hips],
             origin=np.array([self._origin[0], 0.0, self._origin[1]]),
             course=self._facing - rest.heading,
-            ratio=self._ratio,
+            ratio=self._ratio if self._goes_along else 0.0,
             performer=pose.hips,
         )
 

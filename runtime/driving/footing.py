@@ -56,11 +56,11 @@ class Footing:
         rest = performer.rest_positions
         self._legs = legs
         self._body = np.array(body, dtype=np.int64)
-        self._parts = np.array([leg.source[2:] for leg in legs]).reshape(-1, 2)
+        self._parts = np.array([leg.source[2:] for leg in legs], dtype=np.int64).reshape(-1, 2)
         self._has_toes = np.array([leg.source[2] != leg.source[3] for leg in legs], dtype=np.bool_)
-        self._joints = np.array([leg.target[:3] for leg in legs]).reshape(-1, 3)
-        self._points = np.array([leg.target[2:] for leg in legs]).reshape(-1, 2)
-        self._segments = np.array([leg.segments for leg in legs]).reshape(-1, 3)
+        self._joints = np.array([leg.target[:3] for leg in legs], dtype=np.int64).reshape(-1, 3)
+        self._points = np.array([leg.target[2:] for leg in legs], dtype=np.int64).reshape(-1, 2)
+        self._segments = np.array([leg.segments for leg in legs], dtype=np.int64).reshape(-1, 3)
         lengths = [_length(nodes, leg.target[:3]) for leg in legs]
         theirs = [_length(rest, leg.source[:3]) for leg in legs]
         self._stature = float(np.ptp(rest[:, 1]))

@@ -34,8 +34,13 @@ class JointTurns:
         self._from_rest = about_vertical(upright - facing)
         self._fitted: RestTurn | None = None
 
-    def turns(self, pose: Pose) -> Array:
-        """Return the world rotations (W, 4) of the joints from rest; zero where unknown."""
+    def turns(self, pose: Pose, heading: float) -> Array:
+        """Return the world rotations (W, 4) of the joints from rest; zero where unknown.
+
+        Args:
+            pose: of the performer.
+            heading: [rad] the turn of the whole performer, which is taken out.
+        """
         turns = np.zeros((len(self._joints), 4))
         if pose.rotations is None or not len(self._joints):
             return turns
@@ -48,7 +53,7 @@ class JointTurns:
         own = pose.rotations[self._joints]
         known = (self._joints >= 0) & self._fitted.is_usable[self._joints]
         known &= np.isfinite(own).all(axis=1)
-        whole = about_vertical(self._facing - pose.heading)
+        whole = about_vertical(self._facing - heading)
         turned = multiply(whole, multiply(own, multiply(self._fitted.turn, self._from_rest)))
         turns[known] = turned[known]
         return turns
