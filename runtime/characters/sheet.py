@@ -22,7 +22,8 @@ def is_sheet(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> bool:
     if extents[across] > THIN * np.sort(extents)[1]:
         return False
     a, b, c = (np.delete(vertices, across, axis=1)[faces[:, corner]] for corner in range(3))
-    covered = 0.5 * np.abs(np.cross(b - a, c - a)).sum()
+    (x, y), (u, v) = (b - a).T, (c - a).T
+    covered = 0.5 * np.abs(x * v - y * u).sum()
     edges = np.sort(np.concatenate([faces[:, :2], faces[:, 1:], faces[:, ::2]]), axis=1)
     _, times = np.unique(edges, axis=0, return_counts=True)
     sides = 1.0 if (times == 1).any() else 2.0  # a closed one covers its outline twice

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from devices.errors import InputError
-from runtime.driving.body_driver import BodyDriver
+from runtime.driving.body.body_driver import BodyDriver
 from runtime.driving.driver import Driver
 from runtime.driving.pairing import Pairing
 from runtime.driving.polyline_driver import PolylineDriver

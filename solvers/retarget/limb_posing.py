@@ -6,7 +6,7 @@ a hand shows which way its palm looks, it takes that orientation whole, and the 
 of the twist between them, as radius and ulna do.
 
 This is absolute retargeting, as in the tools that animators use; the four papers have no section
-for it. `runtime.driving.body_driver` says which segments correspond.
+for it. `runtime.driving.body.body_driver` says which segments correspond.
 """
 
 from __future__ import annotations

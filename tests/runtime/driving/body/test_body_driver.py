@@ -15,7 +15,7 @@ from devices.bodies.plan_by_names import plan_by_names
 from devices.errors import InputError
 from devices.skeleton import Skeleton, SkeletonFrame
 from runtime.characters.character import Character
-from runtime.driving.body_driver import BodyDriver
+from runtime.driving.body.body_driver import BodyDriver
 from runtime.driving.drivers import best_driver
 from runtime.driving.mapping import Mapping
 from runtime.driving.pairing import Pairing

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.skeleton import Skeleton
-from runtime.driving.body_parts import Leg
+from runtime.driving.body.body_parts import Leg
 from runtime.driving.performer import Pose
 from solvers.retarget.clearance import clearance
 from solvers.retarget.foot_contacts import FootContacts, FootContactsState

@@ -12,13 +12,13 @@ from devices.bodies.body_plan import SIDES, BodyPlan
 from devices.bodies.plan_by_names import plan_by_names
 from devices.errors import InputError
 from devices.skeleton import Skeleton
-from runtime.driving.body_parts import BodyParts, body_parts
+from runtime.driving.body.body_parts import BodyParts, body_parts
+from runtime.driving.body.footing import Footing, FootingState
+from runtime.driving.body.joint_turns import JointTurns
+from runtime.driving.body.path import Path
 from runtime.driving.driver import DrivenPart, Highlight, Needs
-from runtime.driving.footing import Footing, FootingState
-from runtime.driving.joint_turns import JointTurns
 from runtime.driving.pairing import Pairing
 from runtime.driving.part_names import part_name
-from runtime.driving.path import Path
 from runtime.driving.performer import Pose, Rest
 from runtime.driving.root_motion import chain_length
 from runtime.driving.targets import PosedNodes, Targets
@@ -112,6 +112,7 @@ class BodyDriver:
         self._trunk = UPRIGHT
         self._twists = np.zeros(len(parts.rig.near))
         self._nodes = skeleton.rest_nodes
+        self._at_rest = Targets(skeleton.skinned(self._nodes), nodes=self._nodes)
         skeleton.skinned(self._nodes)  # finds the skin now, so that no frame waits for it
 
     def _neutral(self, upright: Array) -> Array:
@@ -149,7 +150,7 @@ class BodyDriver:
         """Return the targets for a pose; those of the rest pose while nothing drives."""
         rest, rig = self._rest, self._parts.rig
         if rest is None:
-            return self._skeleton.at_rest
+            return self._at_rest
         heading = pose.heading if self._goes_along else rest.heading
         joints = turned(pose.seen, self._facing - heading, pose.hips)
         self._trunk = trunk_turns(joints, self._parts.trunk, self._upright, self._trunk)

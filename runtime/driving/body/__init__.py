@@ -1,0 +1,1 @@
+"""Driving a body limb by limb: what corresponds, how it is posed, and how it stands."""
