@@ -37,7 +37,7 @@ def test_replay_writes_everything_it_is_asked_for(
     program: Run, recording: Path, tmp_path: Path
 ) -> None:
     done = program(
-        "replay", recording, "--character", CHARACTER, *SMALL,
+        "replay", recording, "--character", CHARACTER, *SMALL, "--drive", "relative",
         "--report", "r.json", "--cache", "c.pc2", "--video", "v.mp4", "--frames", "pictures",
         "--record", "again.mcap", "--export", "e.glb",
     )  # fmt: skip
@@ -88,7 +88,7 @@ def _check_report(report: dict[str, Any]) -> None:
 def test_equal_shows_write_equal_caches_and_the_match_can_be_given_back(
     bunraku: Run, program: Run, recording: Path, tmp_path: Path
 ) -> None:
-    show = ["replay", recording, "--character", CHARACTER, *SMALL]
+    show = ["replay", recording, "--character", CHARACTER, *SMALL, "--drive", "relative"]
     assert program(*show, "--cache", "a.pc2", "--report", "r.json").returncode == 0
     assert bunraku(*show, "--cache", "b.pc2", "--video", "v.mkv").returncode == 0
     match = json.loads((tmp_path / "r.json").read_text())["match"]
@@ -108,7 +108,7 @@ def test_what_is_asked_of_the_matching_changes_the_show(
     bunraku: Run, recording: Path, tmp_path: Path, plain: NDArray[np.float32], options: list[str]
 ) -> None:
     done = bunraku(
-        "replay", recording, "--character", CHARACTER, *SMALL, *options,
+        "replay", recording, "--character", CHARACTER, *SMALL, "--drive", "relative", *options,
         "--cache", "c.pc2", "--report", "r.json",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
@@ -137,9 +137,10 @@ def test_a_chain_leads_to_a_leaf_or_stops_at_the_sub_tree(
 
 @pytest.fixture(scope="module")
 def plain(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> NDArray[np.float32]:
-    """What the show looks like with no option."""
+    """What the show looks like with no other option."""
     path = tmp_path_factory.mktemp("plain") / "c.pc2"
-    command = ["replay", recording, "--character", CHARACTER, *SMALL, "--cache", path]
+    drive = ["--drive", "relative"]
+    command = ["replay", recording, "--character", CHARACTER, *SMALL, *drive, "--cache", path]
     assert main(list(map(str, command))) == 0
     return point_cache(path)
 
