@@ -136,15 +136,30 @@ class Driver(Protocol):
         ...
 
 
+@dataclass(frozen=True, slots=True)
+class StretchLimits:
+    """How far edges may stretch in a rehearsal before limbs turn by less than the performer's.
+
+    Attributes:
+        of_all: bound on the 99th percentile of all edges in all poses.
+        of_limb: bound on the 95th percentile of the edges at one limb in any one pose.
+    """
+
+    of_all: float = 0.4
+    of_limb: float = 0.4
+
+
 class MappedDriver(Driver):
     """A driver that carries motion from chains of joints over to chains of nodes.
 
     Attributes:
+        limits: how far the surface may stretch at full gains.
         mapping: the mapping that drives, or that is shown.
         gains: (D,) for each drive the share of the performer's turns that is carried over, in
             (0, 1].
     """
 
+    limits: StretchLimits
     mapping: Mapping
     gains: Array
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 from devices.errors import InputError
+from runtime.characters.sheet import is_sheet
 from runtime.driving.body.body_driver import BodyDriver
 from runtime.driving.driver import Driver
 from runtime.driving.pairing import Pairing
-from runtime.driving.polyline_driver import PolylineDriver
+from runtime.driving.polyline_driver import PolylineDriver, SkinnedPolylineDriver
 
 DriverFactory = Callable[[Pairing], Driver]
 """Makes a driver for a performer and a character."""
@@ -17,14 +18,18 @@ DriverFactory = Callable[[Pairing], Driver]
 def best_driver(pairing: Pairing) -> Driver:
     """Return the driver that suits: limb by limb where both have limbs, else by matched chains.
 
-    A mapping made by hand is followed as it is.
+    A mapping made by hand is followed as it is. A page crumples better between rings of handles
+    than by a skin, which takes it for a body.
     """
-    if pairing.by_hand is not None:
+    character = pairing.character
+    if is_sheet(character.vertices, character.faces):
         return PolylineDriver(pairing)
+    if pairing.by_hand is not None:
+        return SkinnedPolylineDriver(pairing)
     try:
         return BodyDriver(pairing)
     except InputError:
-        return PolylineDriver(pairing)
+        return SkinnedPolylineDriver(pairing)
 
 
 DRIVERS: Mapping[str, DriverFactory] = {

@@ -15,7 +15,14 @@ from numpy.typing import NDArray
 from devices.bodies.plan_by_names import plan_by_names
 from devices.errors import InputError
 from runtime.driving.driven_chains import DrivenChains
-from runtime.driving.driver import RELATIVE, DrivenPart, Highlight, MappedDriver, Needs
+from runtime.driving.driver import (
+    RELATIVE,
+    DrivenPart,
+    Highlight,
+    MappedDriver,
+    Needs,
+    StretchLimits,
+)
 from runtime.driving.exaggeration import Exaggeration, ExaggerationState, Strain
 from runtime.driving.limb_release import LimbRelease, LimbReleaseState
 from runtime.driving.mapping import Mapping
@@ -23,7 +30,8 @@ from runtime.driving.pairing import Pairing
 from runtime.driving.part_names import part_name
 from runtime.driving.performer import Pose, Rest
 from runtime.driving.root_motion import RootMotion, chain_length, legs_of, root_motion
-from runtime.driving.targets import HandleTargets, PosedNodes, Targets
+from runtime.driving.targets import HandleTargets, PosedNodes, SkinnedTargets, Targets
+from runtime.puppet.bound_skeleton import Anchors
 from solvers.retarget.chain_retargets import ChainRetargets, ChainRetargetsState
 from solvers.retarget.polyline_motion import map_chain
 
@@ -124,6 +132,7 @@ class PolylineDriver(MappedDriver):
 
     needs = Needs()
     poses_nodes = True
+    limits = StretchLimits()
 
     def __init__(self, pairing: Pairing) -> None:
         self.mapping = Mapping(())
@@ -215,12 +224,14 @@ class PolylineDriver(MappedDriver):
             posed = chains.stretched(posed, strain.of_limbs(chains.limb_of_node)) @ whole.T
         self._positions = posed
         anchors = chains.anchors(placed, posed, strain.of_limbs(chains.limb_of_bone), whole)
-        positions = self._skeleton.handle_positions(anchors, 0.5 * elasticity.volume_gain)
-        return Targets(
-            HandleTargets(self._skeleton.handles, positions, self._weights),
-            placement,
-            PosedNodes(posed, placed.rotations),
-        )
+        nodes = PosedNodes(posed, placed.rotations)
+        return Targets(self._shape(anchors, nodes), placement, nodes)
+
+    def _shape(self, anchors: Anchors, nodes: PosedNodes) -> HandleTargets | SkinnedTargets:
+        """What the surface follows: rings of handles around the bones."""
+        thinning = 0.5 * self._surface.elasticity.volume_gain
+        positions = self._skeleton.handle_positions(anchors, thinning)
+        return HandleTargets(self._skeleton.handles, positions, self._weights)
 
     def reset(self) -> None:
         """Forget the poses before: see `Driver.reset`."""
@@ -289,6 +300,21 @@ class PolylineDriver(MappedDriver):
             self.prepare((), state.rest)
         if self._link is not None:
             self._link.restore(state)
+
+
+class SkinnedPolylineDriver(PolylineDriver):
+    """A `PolylineDriver` whose surface follows by a skin, at the full amplitude of the performer.
+
+    A limb turns by less only where its own surface would tear. Characters that stretch as a cartoon
+    keep their rings, which can grow longer and thinner.
+    """
+
+    limits = StretchLimits(of_all=np.inf, of_limb=1.0)
+
+    def _shape(self, anchors: Anchors, nodes: PosedNodes) -> HandleTargets | SkinnedTargets:
+        if self._surface.elasticity.cartoon > 0.0:
+            return super()._shape(anchors, nodes)
+        return self._skeleton.skinned(nodes)
 
 
 def _whole(strain: Strain, volume_gain: float) -> Array:

@@ -19,10 +19,9 @@ from solvers.signal.histogram import Counts, count, percentile
 
 Array = NDArray[np.float64]
 
-MOST_STRETCH = 0.4  # of an edge
-OF_ALL = 99.0  # percentile of all edges in all poses that is bounded by it
-OF_LIMB = 95.0  # percentile of a limb's edges in any one pose that is bounded by it
-EASY = 0.75  # share of it: a pose that stretches less is not tried again
+OF_ALL = 99.0  # percentile of all edges in all poses that is bounded
+OF_LIMB = 95.0  # percentile of a limb's edges in any one pose that is bounded
+EASY = 0.75  # share of a bound: a pose that stretches less is not tried again
 ROUNDS = 16  # at most
 STEPS = (0.75, 0.9)  # least and greatest factor of a limb's gain in a round
 HELPED = 0.98  # of the stretch before: if more is left, the limb is not the cause
@@ -44,9 +43,10 @@ def limit_turns(puppet: Puppet, driver: MappedDriver, poses: Sequence[Pose]) -> 
     """
     trial = _Trial(puppet, driver, poses)
     for _ in range(ROUNDS):
-        if _tight(trial.all_edges.sum(axis=0), OF_ALL) <= MOST_STRETCH:
+        most = driver.limits.of_all
+        if _tight(trial.all_edges.sum(axis=0), OF_ALL) <= most:
             break
-        driver.gains *= _steps(_tightness(trial))
+        driver.gains *= _steps(_tightness(trial, most), most)
         trial.repeat(_tight(trial.all_edges, OF_ALL))
     for limb in range(len(driver.gains)):
         _spare(driver, trial, limb)
@@ -90,7 +90,7 @@ class _Trial:
 
     def repeat(self, tightness: Array) -> None:
         """Try those poses again that were not easy by their tightness (T,)."""
-        for number in np.flatnonzero(tightness > EASY * MOST_STRETCH).tolist():
+        for number in np.flatnonzero(tightness > EASY * self._driver.limits.of_all).tolist():
             self.attempt(number)
 
     def worst(self, limb: int) -> tuple[int, float]:
@@ -102,7 +102,7 @@ class _Trial:
             tight = _tight(self.limb_edges[:, limb], OF_LIMB)
             number = int(np.argmax(tight))
             is_bound = not np.array_equal(self._gains[number], self._driver.gains)
-            if tight[number] <= MOST_STRETCH or not is_bound:
+            if tight[number] <= self._driver.limits.of_limb or not is_bound:
                 return number, float(tight[number])
             self.attempt(number)
 
@@ -122,17 +122,17 @@ def _tight(counts: Counts, percent: float) -> Array:
     return percentile(counts, _BIN, percent)
 
 
-def _tightness(trial: _Trial) -> Array:
+def _tightness(trial: _Trial, most: float) -> Array:
     """Return the stretch (D,) of the edges that each limb pulls at, over all poses."""
     tight = _tight(trial.limb_edges.sum(axis=0), OF_ALL)
-    if tight.max(initial=0.0) <= MOST_STRETCH:  # no limb alone is the cause: all are
-        return np.full(len(tight), MOST_STRETCH / STEPS[1])
+    if tight.max(initial=0.0) <= most:  # no limb alone is the cause: all are
+        return np.full(len(tight), most / STEPS[1])
     return tight
 
 
-def _steps(tight: Array | float) -> Array:
-    """Return the factor of the gains of limbs with this stretch; 1 where it is small enough."""
-    shares = np.clip(MOST_STRETCH / np.maximum(tight, MOST_STRETCH), STEPS[0], 1.0)
+def _steps(tight: Array | float, most: float) -> Array:
+    """Return the factor of the gains of limbs with this stretch; 1 where it is at most `most`."""
+    shares = np.clip(most / np.maximum(tight, most), STEPS[0], 1.0)
     return np.where(shares < 1.0, np.minimum(shares, STEPS[1]), 1.0)
 
 
@@ -144,10 +144,10 @@ def _spare(driver: MappedDriver, trial: _Trial, limb: int) -> None:
     """
     for _ in range(ROUNDS):
         number, tight = trial.worst(limb)
-        if tight <= MOST_STRETCH:
+        if tight <= driver.limits.of_limb:
             return
         gain = driver.gains[limb]
-        driver.gains[limb] *= _steps(tight)
+        driver.gains[limb] *= _steps(tight, driver.limits.of_limb)
         trial.attempt(number)
         if float(_tight(trial.limb_edges[number, limb], OF_LIMB)) > HELPED * tight:
             driver.gains[limb] = gain

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from runtime.characters.character import Character
+from runtime.driving.driver import StretchLimits
 from runtime.driving.mapping import Drive
 from runtime.driving.performer import Performer, Pose, rest_state
 from runtime.driving.polyline_driver import PolylineDriver
-from runtime.driving.turn_limits import MOST_STRETCH, limit_turns
+from runtime.driving.turn_limits import limit_turns
 from runtime.puppet.puppet import Puppet
 from tests.runtime.stick_figures import (
     ARMS,
@@ -78,11 +79,15 @@ def test_a_small_limb_that_crushes_itself_is_held_back(deepest: float, held: boo
     edges = driver.pulls()[:, 0]
     poses = nods(*[0.0] * 9, deepest)
     unheld = stretch_of(puppet, poses[-1])
-    assert np.percentile(np.append(np.zeros(9 * len(unheld)), unheld), 99.0) < MOST_STRETCH
+    assert (
+        np.percentile(np.append(np.zeros(9 * len(unheld)), unheld), 99.0) < StretchLimits().of_all
+    )
     limit_turns(puppet, driver, poses)
     assert (driver.gains[0] < 1.0) == held
     np.testing.assert_array_equal(driver.gains[1:], 1.0)
-    assert np.percentile(stretch_of(puppet, poses[-1])[edges], 95.0) <= 1.1 * MOST_STRETCH
+    assert (
+        np.percentile(stretch_of(puppet, poses[-1])[edges], 95.0) <= 1.1 * StretchLimits().of_limb
+    )
 
 
 def test_a_limb_that_another_crushes_is_left_alone() -> None:
