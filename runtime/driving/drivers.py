@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 
 from devices.errors import InputError
 from runtime.characters.sheet import is_sheet
@@ -18,18 +19,23 @@ DriverFactory = Callable[[Pairing], Driver]
 def best_driver(pairing: Pairing) -> Driver:
     """Return the driver that suits: limb by limb where both have limbs, else by matched chains.
 
-    A mapping made by hand is followed as it is. A page crumples better between rings of handles
-    than by a skin, which takes it for a body.
+    A mapping made by hand is followed as it is.
+    """
+    if pairing.by_hand is None:
+        with suppress(InputError):
+            return BodyDriver(pairing)
+    return matched_driver(pairing)
+
+
+def matched_driver(pairing: Pairing) -> Driver:
+    """Return the driver that suits where the user chooses among matches on the screen.
+
+    A page crumples better between rings of handles than by a skin, which takes it for a body.
     """
     character = pairing.character
     if is_sheet(character.vertices, character.faces):
         return PolylineDriver(pairing)
-    if pairing.by_hand is not None:
-        return SkinnedPolylineDriver(pairing)
-    try:
-        return BodyDriver(pairing)
-    except InputError:
-        return SkinnedPolylineDriver(pairing)
+    return SkinnedPolylineDriver(pairing)
 
 
 DRIVERS: Mapping[str, DriverFactory] = {

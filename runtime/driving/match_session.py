@@ -214,7 +214,7 @@ class MatchSession:
     def match_again(self) -> None:
         """Return to matching, by the pose alone, whatever was stepped to by hand."""
         for match in self._matches:
-            match.release()
+            match.release(self._view())
         self._return_to_matching()
 
     def next_match(self) -> None:
@@ -227,7 +227,7 @@ class MatchSession:
 
     def _step(self, ranks: int) -> None:
         for match in self._matches:
-            match.step(ranks)
+            match.step(ranks, self._view())
         if not self.matching:
             self._return_to_matching()
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from devices.errors import InputError
 from runtime.driving.driver import DrivenPart, Driver, MappedDriver
-from runtime.driving.drivers import DriverFactory
+from runtime.driving.drivers import DriverFactory, best_driver, matched_driver
 from runtime.driving.mapping import Drive, Mapping
 from runtime.driving.pairing import Pairing
 from runtime.driving.performer import Performer, Pose, Rest
@@ -92,6 +92,7 @@ class PuppetMatch:
         self._hierarchy = TargetHierarchy(puppet.bound_skeleton.tree, puppet.bound_skeleton.root)
         self._hierarchy.rank(source, STRAIGHT_ON, limit=1)  # so that no frame waits for a compiler
         self._hysteresis = MatchHysteresis(choices.rank - 1)
+        self._make_driver = make_driver
         self._driver = self._make(make_driver)
         puppet.drive_with(self._driver)
 
@@ -205,13 +206,22 @@ class PuppetMatch:
         self.puppet.rest()
         self.rest = None
 
-    def step(self, ranks: int) -> None:
-        """Show the match so many ranks after the one shown, and stay there."""
+    def step(self, ranks: int, view: Array) -> None:
+        """Show the match so many ranks after the one shown, and stay there.
+
+        Where the anatomy had chosen, the first step shows the best match: the user's choice beats
+        both.
+        """
+        if self._make_driver is best_driver and not isinstance(self._driver, MappedDriver):
+            self.switch(matched_driver, view)
+            return
         self._hysteresis.cycle(ranks)
 
-    def release(self) -> None:
-        """Let the pose alone choose the match again."""
+    def release(self, view: Array) -> None:
+        """Let the pose alone choose the match again, or the anatomy."""
         self._hysteresis.release()
+        if self._make_driver is best_driver:
+            self.switch(best_driver, view)
 
     def switch(self, make_driver: DriverFactory, view: Array) -> None:
         """Let another driver move the puppet from the next pose on, from the same rest state.

@@ -22,7 +22,7 @@ from runtime.control.actions import ShowControls
 from runtime.control.keys import WindowControls
 from runtime.control.remote import PORT, Remote
 from runtime.control.window import Window, leave_windows
-from runtime.driving.drivers import DRIVERS, DriverFactory
+from runtime.driving.drivers import DRIVERS, DriverFactory, matched_driver
 from runtime.driving.mapping import read_mapping
 from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer
@@ -42,7 +42,7 @@ from runtime.show.outputs import check_outputs, open_outputs
 from runtime.show.pacing import TICKS, loses_no_frame
 from runtime.show.provenance import provenance
 from runtime.show.scene import Scene
-from runtime.show.settings import CharacterSettings, ShowSettings
+from runtime.show.settings import CharacterSettings, MatchSettings, ShowSettings
 from runtime.show.takes import Takes, set_aside
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ class OpenedShow:
         self._source = stream
         self._stream = closing.enter_context(RecordedStream(stream))
         _check(characters, settings)
-        self._make_driver = make_driver or _driver(settings.match.driver)
+        self._make_driver = make_driver or _driver(settings.match)
         self.remote = self._open_remote()
         usual = for_live() if self._recording is None else for_recording()
         self._conditioning = asked_for(usual, settings.conditioning)
@@ -329,7 +329,10 @@ class OpenedShow:
         return Recorder(path, self._stream.skeleton, source=provenance(origin), tell=self._warn)
 
 
-def _driver(name: str) -> DriverFactory:
+def _driver(match: MatchSettings) -> DriverFactory:
+    name = match.driver
+    if name == "auto" and (match.rank > 1 or match.flip or not match.extend):
+        return matched_driver  # who chooses among matches beats the anatomy
     if name not in DRIVERS:
         raise InputError(
             f"MatchSettings.driver: no driver is called {name!r}; there are: {', '.join(DRIVERS)}"
