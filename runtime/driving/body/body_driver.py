@@ -15,6 +15,7 @@ from devices.skeleton import Skeleton
 from runtime.driving.body.body_parts import BodyParts, body_parts
 from runtime.driving.body.footing import Footing, FootingState
 from runtime.driving.body.joint_turns import JointTurns
+from runtime.driving.body.long_arms import LongArms
 from runtime.driving.body.path import Path
 from runtime.driving.driver import DrivenPart, Highlight, Needs
 from runtime.driving.pairing import Pairing
@@ -106,6 +107,7 @@ class BodyDriver:
         self._footing = Footing(
             performer, upright, skeleton.tree.positions, parts.legs, sorted(body)
         )
+        self._long_arms = LongArms(skeleton.tree.positions, parts.arms, parts.legs)
         left = [np.cos(self._facing), 0.0, -np.sin(self._facing)]
         self._left = np.array(left)
         self._origin: Array | None = None
@@ -163,6 +165,8 @@ class BodyDriver:
         left = rotate(self._trunk[0], self._left)
         self._footing.turn_soles(joints, left, pose.time, given)
         pose_limbs(rig, joints, self._trunk, given, self._twists, rotations, positions)
+        if self._long_arms.raise_arms(positions, rotations, given):
+            pose_limbs(rig, joints, self._trunk, given, self._twists, rotations, positions)
         path = self._path(pose, rest, heading)
         if self._footing.plant(
             pose,

@@ -60,6 +60,21 @@ class Leg:
     segments: tuple[int, int, int]
 
 
+@dataclass(frozen=True, slots=True)
+class Arm:
+    """An arm of the character that points where the performer's points.
+
+    Attributes:
+        target: nodes, from the shoulder outward.
+        segments: numbers of its segments.
+        starts: the node at which each begins.
+    """
+
+    target: Chain
+    segments: tuple[int, ...]
+    starts: tuple[int, ...]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyParts:
     """The corresponding parts of a performer and a character, ready to be posed.
@@ -72,6 +87,7 @@ class BodyParts:
         hand_change: (S, 4) from the character's hand at rest to the performer's at rest.
         skull: the performer's joint that turns the head; -1 for none.
         legs: the legs of both.
+        arms: the arms that are driven absolutely.
     """
 
     parts: tuple[Part, ...]
@@ -81,6 +97,7 @@ class BodyParts:
     hand_change: Array
     skull: int
     legs: tuple[Leg, ...]
+    arms: tuple[Arm, ...]
 
 
 def body_parts(
@@ -105,7 +122,8 @@ def body_parts(
     """
     rig = _Rig(tree, upright, facing)
     parts: list[Part] = []
-    legs = []
+    legs: list[Leg] = []
+    arms: list[Arm] = []
     chosen = frozenset(joints)
     for side in SIDES:
         theirs, ours = source.legs.get(side), plan.legs.get(side)
@@ -117,8 +135,13 @@ def body_parts(
     for side in SIDES:
         theirs, ours = source.arms.get(side), plan.arms.get(side)
         if theirs and ours and chosen.issuperset(theirs.upper):
+            first = rig.segments
             drive = rig.add_arm(theirs, ours, _knuckles(source, side), _knuckles(plan, side))
             parts.append(Part(f"{side} arm", _joined(theirs), _joined(ours), drive))
+            if drive == ABSOLUTE:
+                numbers = tuple(range(first, rig.segments))
+                starts = tuple(chain[0] for chain in ours.segments[: len(numbers)])
+                arms.append(Arm(_joined(ours), numbers, starts))
             rig.add_fingers(source, plan, side)
     has_head = bool(source.head and plan.head) and not chosen.isdisjoint(source.head[1:])
     if not parts and not has_head:
@@ -137,6 +160,7 @@ def body_parts(
         np.array(rig.hand_change),
         skull,
         tuple(legs),
+        tuple(arms),
     )
 
 
@@ -157,6 +181,11 @@ class _Rig:
         self._twisted_by: list[int] = []
         self.hands: list[int] = []
         self.hand_change: list[Array] = []
+
+    @property
+    def segments(self) -> int:
+        """How many segments there are."""
+        return len(self._near)
 
     def add_leg(self, theirs: Limb, ours: Limb) -> tuple[str, tuple[int, int, int]]:
         """Let a leg follow a leg; return how it is driven, and its segments as of `Leg`."""

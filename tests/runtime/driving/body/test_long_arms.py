@@ -1,0 +1,63 @@
+"""Wings that would reach below the floor lie on it, and all other arms are let be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from runtime.driving.body.body_parts import Arm, Leg
+from runtime.driving.body.long_arms import LongArms
+
+# hips, knee, ankle; shoulder, elbow, tip of a wing that is longer than the shoulder is high
+NODES = np.array(
+    [
+        [0.1, 0.5, 0.0],
+        [0.1, 0.25, 0.0],
+        [0.1, 0.0, 0.0],
+        [0.2, 0.8, 0.0],
+        [0.9, 0.8, 0.0],
+        [1.6, 0.8, 0.0],
+    ]
+)
+LEG = Leg((0, 1, 2, 2), (0, 1, 2, 2), (2, 3, -1))
+WING = Arm((3, 4, 5), (0, 1), (3, 4))
+
+
+def hung(turn: Rotation) -> tuple[np.ndarray, np.ndarray]:
+    """The nodes with the wing turned about its shoulder, and their rotations."""
+    positions, rotations = NODES.copy(), np.tile([0.0, 0.0, 0.0, 1.0], (6, 1))
+    positions[3:] = NODES[3] + turn.apply(NODES[3:] - NODES[3])
+    rotations[3:] = turn.as_quat()
+    return positions, rotations
+
+
+@given(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5))
+def test_a_wing_stays_above_the_floor_and_points_as_before_where_it_is(
+    about_y: float, about_z: float
+) -> None:
+    positions, rotations = hung(Rotation.from_euler("zy", [-about_z, about_y]))
+    turns = np.zeros((4, 4))
+    raised = LongArms(NODES, [WING], [LEG]).raise_arms(positions, rotations, turns)
+    assert raised == (positions[5, 1] < 0.016)
+    if raised:
+        tip = positions[3] + Rotation.from_quat(turns[0]).apply(NODES[5] - NODES[3])
+        assert tip[1] == pytest.approx(0.016, abs=1e-9)
+        np.testing.assert_allclose(turns[0], turns[1], atol=1e-12)
+
+
+def test_it_begins_where_the_floor_begins() -> None:
+    edge = np.arcsin((0.8 - 0.016) / 1.4)
+    wing = LongArms(NODES, [WING], [LEG])
+    turns = np.zeros((4, 4))
+    below = Rotation.from_euler("z", -(edge + 1e-6))
+    assert wing.raise_arms(*hung(below), turns)
+    assert (Rotation.from_quat(turns[0]) * below.inv()).magnitude() < 1e-4
+
+
+def test_an_arm_that_does_not_reach_the_floor_is_let_be() -> None:
+    short = Arm((3, 4), (0,), (3,))
+    positions, rotations = hung(Rotation.from_euler("z", -np.pi / 2.0))
+    assert not LongArms(NODES, [short], [LEG]).raise_arms(positions, rotations, np.zeros((4, 4)))
