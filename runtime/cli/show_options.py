@@ -100,6 +100,7 @@ def show_settings(options: argparse.Namespace, origin: str) -> ShowSettings:
             extend=options.chains == "extend",
             flip=options.flip,
             driver=options.drive,
+            in_place=options.in_place,
         ),
         characters=tuple(_character(options, number) for number in range(count)),
         conditioning={
@@ -239,6 +240,11 @@ def _add_match(parser: argparse.ArgumentParser) -> None:
         help="how a character follows: absolute points each limb where the performer's points, "
         "relative turns matched chains from a rest pose, auto (default) is absolute where both "
         "have such limbs",
+    )
+    match.add_argument(
+        "--in-place",
+        action="store_true",
+        help="let characters stay where they are; else they travel as their performers do",
     )
     match.add_argument(
         "--performers",

@@ -12,7 +12,8 @@ from enum import Enum
 
 from replay.playback import Playback
 from runtime.conditioning.switches import SWITCHES, Conditioning
-from runtime.puppet.deformable_surface import DeformableSurface, Elasticity
+from runtime.puppet.deformable_surface import Elasticity
+from runtime.puppet.puppet import Puppet
 from runtime.show.act_group import MatchControls
 from runtime.show.loop import FrameLoop
 from runtime.show.scene import Scene
@@ -29,7 +30,7 @@ class ShowControls:
         match_controls: matching, of all acts.
         conditioning: the switches of the conditioning.
         loop: the frame loop, which freezes the characters.
-        surfaces: the surfaces of all characters.
+        puppets: all characters as they are driven.
         takes: the recorder of takes.
         playback: the playback of a recording; None where the stream is live.
         scene: the picture; None where no picture is drawn.
@@ -39,7 +40,7 @@ class ShowControls:
     match_controls: MatchControls
     conditioning: Conditioning
     loop: FrameLoop
-    surfaces: Sequence[DeformableSurface]
+    puppets: Sequence[Puppet]
     takes: Takes
     playback: Playback | None = None
     scene: Scene | None = None
@@ -103,12 +104,12 @@ class Slider:
 
     def read(self, controls: ShowControls) -> float:
         """Return the first character's value as a share of the fader's range."""
-        value = float(getattr(controls.surfaces[0].elasticity, self.field))
+        value = float(getattr(controls.puppets[0].surface.elasticity, self.field))
         return min(value / self.most, 1.0)
 
     def write(self, controls: ShowControls, share: float) -> None:
         """Set all characters to a share of the fader's range."""
-        for surface in controls.surfaces:
+        for surface in (puppet.surface for puppet in controls.puppets):
             changed: Elasticity = replace(surface.elasticity, **{self.field: share * self.most})
             if changed != surface.elasticity:
                 surface.elasticity = changed
@@ -223,6 +224,11 @@ def _freeze(controls: ShowControls, on: bool) -> None:
     controls.loop.frozen = on
 
 
+def _in_place(controls: ShowControls, on: bool) -> None:
+    for puppet in controls.puppets:
+        puppet.travel.in_place = on
+
+
 def _blackout(controls: ShowControls, on: bool) -> None:
     if controls.scene is not None:
         controls.scene.blackout.to(float(on))
@@ -283,6 +289,11 @@ ACTIONS: Mapping[str, Action] = {
         "freeze: characters stand still while the stream goes on",
         lambda controls: controls.loop.frozen,
         _freeze,
+    ),
+    "in-place": _switch(
+        "in place: characters stay where they are, or travel as their performers do",
+        lambda controls: controls.puppets[0].travel.in_place,
+        _in_place,
     ),
     "blackout": _switch(
         "blackout: fade to black, and back",

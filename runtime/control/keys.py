@@ -29,6 +29,7 @@ KEYS = {
     "t": "rest-pose",
     "r": "record",
     "e": "freeze",
+    "g": "in-place",
     "b": "blackout",
     "up": "cartoon-up",
     "down": "cartoon-down",

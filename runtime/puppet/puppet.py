@@ -16,6 +16,7 @@ from runtime.driving.targets import HandleTargets, PosedNodes, SkinnedTargets, T
 from runtime.puppet.bound_skeleton import BoundSkeleton
 from runtime.puppet.deformable_surface import DeformableSurface, SurfaceState
 from runtime.puppet.placement import Stance, put_on_stage
+from runtime.puppet.travel import Travel, TravelState
 from solvers.deform.arap_cells import SPOKES
 
 Array = NDArray[np.float64]
@@ -44,6 +45,7 @@ class PuppetState:
         surface: of the deformable surface.
         targets: of the last frame.
         stance: of the last frame.
+        travel: how much of its way it goes.
         driver_kind: the class of the driver; None without one.
         driver: of the driver.
     """
@@ -51,6 +53,7 @@ class PuppetState:
     surface: SurfaceState
     targets: Targets
     stance: Stance
+    travel: TravelState
     driver_kind: type[Driver] | None
     driver: Any
 
@@ -70,6 +73,7 @@ class Puppet:
         bound_skeleton: the character's skeleton, bound to its surface.
         surface: the character's surface.
         driver: what moves it; None before the first one.
+        travel: how much of its way over the stage it goes.
     """
 
     def __init__(self, character: Character, *, iterations: int = 2, energy: str = SPOKES) -> None:
@@ -81,6 +85,7 @@ class Puppet:
             proxy, skeleton.handles, skeleton.stiff_segments, energy=energy
         )
         self.driver: Driver | None = None
+        self.travel = Travel()
         self._targets = skeleton.at_rest
         self._standing = [np.empty_like(character.vertices) for _ in range(2)]
         self._root = skeleton.tree.positions[skeleton.root]
@@ -98,6 +103,7 @@ class Puppet:
         """Take over the targets that the driver has for the performer's pose."""
         if self.driver is not None:
             self._targets = self.driver.targets(pose)
+        self.travel.follow(pose.time)
 
     def deform(self) -> Motion:
         """Return the character as its targets say, on the stage."""
@@ -121,6 +127,7 @@ class Puppet:
     def forget(self) -> None:
         """Go on as if no pose had been struck; the targets stay."""
         self.surface.reset()
+        self.travel.reset()
         if self.driver is not None:
             self.driver.reset()
 
@@ -131,6 +138,7 @@ class Puppet:
             self.surface.snapshot(),
             self._targets,
             self._stance,
+            self.travel.snapshot(),
             None if driver is None else type(driver),
             None if driver is None else driver.snapshot(),
         )
@@ -142,6 +150,7 @@ class Puppet:
         """
         self.surface.restore(state.surface)
         self._targets, self._stance = state.targets, state.stance
+        self.travel.restore(state.travel)
         if self.driver is None:
             return
         if type(self.driver) is state.driver_kind:
@@ -167,7 +176,8 @@ class Puppet:
         vertices = self._vertices(targets.shape, iterations)
         self._standing.reverse()
         standing = self._standing[0]
-        self._stance = put_on_stage(vertices, targets.placement, self._root, standing)
+        placement = self.travel.of(targets.placement)
+        self._stance = put_on_stage(vertices, placement, self._root, standing)
         nodes = None if targets.nodes is None else self._stance.place_nodes(targets.nodes)
         return Motion(standing, nodes)
 

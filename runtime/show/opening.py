@@ -155,6 +155,7 @@ class OpenedShow:
     def _puppet(self, character: Character, own: CharacterSettings) -> Puppet:
         puppet = Puppet(character, iterations=own.iterations, energy=own.energy)
         puppet.surface.elasticity = Elasticity(own.cartoon, own.volume_gain, own.stiffness)
+        puppet.travel.in_place = self._settings.match.in_place
         for note in puppet.surface.notes:
             self._warn(f"{character.name}: {note}")
         return puppet
@@ -298,7 +299,7 @@ class OpenedShow:
             match_controls=ActGroup([act.match_session for act in self.acts]),
             conditioning=self._conditioning,
             loop=self.loop,
-            surfaces=[puppet.surface for puppet in self.puppets],
+            puppets=self.puppets,
             takes=self._open_takes(),
             playback=playback_of(self._stream),
             scene=self.scene,

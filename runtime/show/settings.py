@@ -72,6 +72,7 @@ class MatchSettings:
         driver: how characters follow, a name in `runtime.driving.drivers.DRIVERS`: "absolute"
             points each limb where the performer's points, "relative" turns matched chains from a
             rest pose, "auto" is absolute where both bodies have such limbs.
+        in_place: characters stay where they are instead of travelling as their performers do.
         rehearse: look through a recording for the pose to start from; False matches a recording as
             it matches a live performer.
         patience: [s] that a match must be shown before it performs by itself; 0 at once, infinite
@@ -88,6 +89,7 @@ class MatchSettings:
     extend: bool = True
     flip: bool = False
     driver: str = "auto"
+    in_place: bool = False
     rehearse: bool = True
     patience: float | None = None
 

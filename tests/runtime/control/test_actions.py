@@ -62,8 +62,8 @@ def perform(show: StagedShow) -> None:
 
 TRIED_HERE = {
     "match-again", "accept", "next-match", "previous-match", "rest-pose", "calibrate", "hold",
-    "play", "pause", "home", "record", "freeze", "blackout", "frame-all", "chains", "leave",
-    *FADERS, *(f"{name}-{way}" for name in FADERS for way in ("up", "down")), *SWITCHES,
+    "play", "pause", "home", "record", "freeze", "in-place", "blackout", "frame-all", "chains",
+    "leave", *FADERS, *(f"{name}-{way}" for name in FADERS for way in ("up", "down")), *SWITCHES,
 }  # fmt: skip
 
 
@@ -261,6 +261,15 @@ def test_a_blackout_fades_pictures_to_black_and_back(show: StagedShow) -> None:
     again = show.seen.pictures[-1][..., :3].astype(int)
     np.testing.assert_array_equal(again[puppet_only], light_before[puppet_only])
     assert light(show, "blackout") == 0.0
+
+
+def test_who_is_in_place_is_told_so(show: StagedShow) -> None:
+    press(show, "in-place")
+    assert show.puppet.travel.in_place
+    assert light(show, "in-place") == 1.0
+    put(show, "in-place", 0.0)
+    assert not show.puppet.travel.in_place
+    assert light(show, "in-place") == 0.0
 
 
 def test_everybody_is_framed(show: StagedShow) -> None:
