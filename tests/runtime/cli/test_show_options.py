@@ -49,7 +49,7 @@ def test_every_option_arrives() -> None:
     settings = settings_of(
         "--size", "64x48", "--plain", "--background", "#010203", "--fps", "30",
         "--source", "arms", "--performers", "1", "--match", "3", "--mapping", "m.json",
-        "--chains", "stop", "--flip", "--in-place", "--volume-gain", "2",
+        "--drive", "relative", "--chains", "stop", "--flip", "--in-place", "--volume-gain", "2",
         "--no-outliers", "--mirror",
         "--video", "v.mp4", "--frames", "p", "--cache", "c.pc2", "--report", "r.json",
         "--record", "o.mcap", "--export", "e.glb",
@@ -63,7 +63,9 @@ def test_every_option_arrives() -> None:
         background=Background(1, 2, 3),
         plain=True,
         fps=30.0,
-        match=MatchSettings("arms", 1, 3, Path("m.json"), extend=False, flip=True, in_place=True),
+        match=MatchSettings(
+            "arms", 1, 3, Path("m.json"), extend=False, flip=True, driver="relative", in_place=True
+        ),
         characters=(CharacterSettings(volume_gain=2.0),),
         conditioning={"outliers": False, "mirror": True},
         files=FileSettings(
@@ -100,7 +102,7 @@ def test_no_field_of_the_settings_is_forgotten() -> None:
     """A new setting is either set by an option, and tried above, or is for the library alone."""
     for_the_library = {
         ShowSettings: {"pictures"},
-        MatchSettings: {"driver", "rehearse", "patience"},
+        MatchSettings: {"rehearse", "patience"},
         FileSettings: {"takes"},
     }
     source = Path(str(show_settings.__code__.co_filename)).read_text(encoding="utf-8")
