@@ -78,7 +78,9 @@ def driver_character(driver: BodyDriver) -> Character:
     return driver._character
 
 
-def errors(nodes: PosedNodes, positions: NDArray, heading: float = 0.0) -> NDArray:
+def errors(
+    nodes: PosedNodes, positions: NDArray[np.float64], heading: float = 0.0
+) -> NDArray[np.float64]:
     """The angles [deg] between the limbs of figure and performer, who is turned by `heading`."""
     seen = turned(positions, heading, np.zeros(3))
     found = []
@@ -90,7 +92,7 @@ def errors(nodes: PosedNodes, positions: NDArray, heading: float = 0.0) -> NDArr
     return np.array(found)
 
 
-def bent(numbers: list[float]) -> NDArray:
+def bent(numbers: list[float]) -> NDArray[np.float64]:
     """A pose with every joint of the limbs turned."""
     turns = np.reshape(numbers, (8, 3))
     joints = [
@@ -116,7 +118,7 @@ def lowered() -> BodyDriver:
 
 @given(positions=ANY_BEND)
 def test_limbs_point_where_the_performers_point_whatever_the_rest_pose(
-    upright: BodyDriver, lowered: BodyDriver, positions: NDArray
+    upright: BodyDriver, lowered: BodyDriver, positions: NDArray[np.float64]
 ) -> None:
     for driver in (upright, lowered):
         (nodes,) = follow(driver, positions)
@@ -151,7 +153,7 @@ def test_the_body_turns_as_the_performer_turns(upright: BodyDriver) -> None:
     np.testing.assert_allclose(turned(arm[0][None], turn, np.zeros(3))[0], arm[1], atol=1e-6)
 
 
-def squatting(share: float) -> NDArray:
+def squatting(share: float) -> NDArray[np.float64]:
     """A squat on both feet, by `share` of a right angle of the knees."""
     angle = 0.25 * np.pi * share
     turns = {}
