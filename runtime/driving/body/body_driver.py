@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.bodies.body_plan import SIDES, BodyPlan
+from devices.bodies.body_plan import SIDES
 from devices.bodies.plan_by_names import plan_by_names
+from devices.bodies.rest_heading import rest_heading
 from devices.errors import InputError
-from devices.skeleton import Skeleton
 from runtime.driving.body.body_parts import BodyParts, body_parts
 from runtime.driving.body.footing import Footing, FootingState
 from runtime.driving.body.joint_turns import JointTurns
@@ -23,7 +23,7 @@ from runtime.driving.part_names import part_name
 from runtime.driving.performer import Pose, Rest
 from runtime.driving.root_motion import chain_length
 from runtime.driving.targets import PosedNodes, Targets
-from solvers.retarget.heading import heading, turned
+from solvers.retarget.heading import turned
 from solvers.retarget.joint_rotations import RestTurn
 from solvers.retarget.limb_posing import pose_limbs
 from solvers.retarget.trunk_turns import UPRIGHT, orientations, trunk_turns
@@ -76,8 +76,8 @@ class BodyDriver:
         if plan is None or source is None:
             who = character.name if plan is None else "the performer"
             raise InputError(f"{who} has no limbs that are known: use --drive relative")
-        self._facing = facing_of(character.skeleton, plan)
-        heading_at_rest = facing_of(performer, source)
+        self._facing = rest_heading(character.skeleton, plan)
+        heading_at_rest = rest_heading(performer, source)
         upright = turned(performer.rest_positions, self._facing - heading_at_rest, np.zeros(3))
         parts = body_parts(
             performer,
@@ -254,13 +254,3 @@ class BodyDriver:
         self._twists = state.twists.copy()
         self._joint_turns.restore(state.rest_turn)
         self._footing.restore(state.footing)
-
-
-def facing_of(skeleton: Skeleton, plan: BodyPlan) -> float:
-    """Return the heading [rad] of a body at rest, from +Z towards its left."""
-    pairs = [
-        [limbs[side].upper[0] for side in SIDES]
-        for limbs in (plan.legs, plan.arms)
-        if len(limbs) == len(SIDES)
-    ]
-    return heading(skeleton.rest_positions.copy(), np.array(pairs, dtype=np.int64).reshape(-1, 2))
