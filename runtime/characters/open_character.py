@@ -7,9 +7,12 @@ from pathlib import Path
 
 from devices.bodies.plan_by_names import plan_by_declaration, plan_by_names
 from devices.errors import InputError
+from runtime.characters.bare_body import with_body_by_shape
 from runtime.characters.builtin import BUILTIN, builtin_character
 from runtime.characters.character import Character
 from runtime.characters.character_file import SUFFIXES, read_character
+from runtime.characters.facing import facing_the_audience
+from runtime.characters.formats.mesh_file import MESH_SUFFIXES
 from runtime.characters.parallel_bones import split_parallel_bones
 from runtime.characters.sheet import is_sheet
 from runtime.characters.side_view import turned_to_best_side
@@ -23,8 +26,9 @@ def is_character(name: str) -> bool:
 def load_character(name: str | Path) -> Character:
     """Return a character ready to perform: built-in, or read from a mesh or rig file.
 
-    A file's character is read by `read_character`; then parallel bones are split, and a long
-    character, such as a camel, is turned to show its side.
+    A file's character is read by `read_character`; then parallel bones are split, the parts of its
+    body are recognised, a back is turned from the audience, and a long character, such as a camel,
+    is turned to show its side.
 
     Args:
         name: of a built-in character, or the path of a file.
@@ -39,7 +43,19 @@ def load_character(name: str | Path) -> Character:
             f"no character is called {str(name)!r}: give the path of a mesh or rig file, or one of "
             f"{', '.join(BUILTIN)}"
         )
-    return _planned(turned_to_best_side(split_parallel_bones(read_character(Path(name)))))
+    return turned_to_best_side(_recognised(Path(name)))
+
+
+def _recognised(path: Path) -> Character:
+    """The character in a file with the plan of its body.
+
+    A mesh that shows its back is turned about; rig files say themselves which way is forward.
+    """
+    character = split_parallel_bones(read_character(path))
+    if character.weights is not None or is_sheet(character.vertices, character.faces):
+        return _planned(character)
+    character = with_body_by_shape(character)
+    return facing_the_audience(character) if path.suffix.lower() in MESH_SUFFIXES else character
 
 
 def _planned(character: Character) -> Character:

@@ -8,12 +8,10 @@ by a quarter to its left.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from devices.skeleton import Skeleton
 from runtime.characters.character import Character
+from runtime.characters.facing import turned
 
 LONG = 2.0  # least ratio of length to width
 MORE = 1.2  # least ratio of the bones' lengths from the side to those from the front
@@ -26,18 +24,7 @@ def turned_to_best_side(character: Character) -> Character:
     width, _, length = np.ptp(character.vertices, axis=0)
     if length < LONG * width or _bones_seen(character, 2) < MORE * _bones_seen(character, 0):
         return character
-    skeleton = character.skeleton
-    to_the_left = np.eye(4)
-    to_the_left[:3, :3] = _TO_THE_LEFT
-    return replace(
-        character,
-        vertices=character.vertices @ _TO_THE_LEFT.T,
-        skeleton=Skeleton(
-            skeleton.names, skeleton.parents, skeleton.rest_positions @ _TO_THE_LEFT.T
-        ),
-        file_to_stage=to_the_left @ character.file_to_stage,
-        notes=(*character.notes, "shows more from the side: turned to its left"),
-    )
+    return turned(character, _TO_THE_LEFT, "shows more from the side: turned to its left")
 
 
 def _bones_seen(character: Character, across: int) -> float:

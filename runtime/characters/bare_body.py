@@ -1,0 +1,34 @@
+"""Recognise the body of a mesh without a rig, whose skeleton was extracted from its surface."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from devices.skeleton import Skeleton
+from runtime.characters.character import Character
+from runtime.characters.plan_by_shape import plan_by_shape
+from solvers.skeleton.limbs import surface_points
+from solvers.skeleton.mirror_plane import SYMMETRIC, mirror_planes
+from solvers.skeleton.rejoined import rejoined
+
+_PLANES = 4  # that are tried
+
+
+def with_body_by_shape(character: Character) -> Character:
+    """Return the character with the plan of its body, None where the shape is not clear.
+
+    A limb that the skeleton hangs on the foot of its partner is hung on the trunk.
+    """
+    points = surface_points(character.vertices, character.faces)
+    if not np.ptp(points, axis=0).max() > 0.0:
+        return character
+    planes = mirror_planes(points, _PLANES)
+    skeleton = character.skeleton
+    if planes and planes[0].asymmetry < SYMMETRIC:
+        parents = rejoined(skeleton.tree, planes[0], float(np.ptp(points, axis=0).max()))
+        if parents is not None:
+            skeleton = Skeleton(skeleton.names, parents, skeleton.rest_positions)
+    plan = plan_by_shape(character.vertices, character.faces, skeleton.tree, planes)
+    return replace(character, skeleton=skeleton, plan=plan)
