@@ -97,7 +97,13 @@ def figures_of(performance: Performance, face: tuple[int, int] | None) -> dict[s
             "limbs": {name: asdict(limb) for name, limb in limbs.items()},
             "sides": sides(performer, character),
             "ground": asdict(
-                ground_figures(performer, character, performance.lowest, performance.height)
+                ground_figures(
+                    performer,
+                    character,
+                    performance.positions,
+                    performance.lowest,
+                    performance.height,
+                )
             ),
             "head_yaw_kept": head_yaw_kept(performer, character, face),
             "hand_roll_kept": hand_roll_kept(performer, character),

@@ -13,8 +13,10 @@ from PIL import Image
 
 from devices.bodies.body_plan import SIDES
 from devices.bodies.plan_by_names import plan_by_names
+from devices.skeleton import Skeleton
 from replay.builtin import builtin_recording
 from runtime.benchmarks.likeness import figures_of, lines, run
+from runtime.benchmarks.resemblance.body_track import off_body
 from runtime.benchmarks.resemblance.contact_sheet import MOMENTS, SIZE, draw_performer
 from runtime.benchmarks.resemblance.performance import perform
 from runtime.characters.character import Character
@@ -122,6 +124,13 @@ def test_the_performers_left_is_red_and_on_the_right_of_the_picture():
     red = np.argwhere(picture[..., 0] - picture[..., 2] > 100)
     blue = np.argwhere(picture[..., 2] - picture[..., 0] > 100)
     assert red[:, 1].min() > blue[:, 1].max()
+
+
+def test_a_root_on_the_floor_is_no_part_of_the_body():
+    names, parents = ("root", *BODY.names), [-1, *(BODY.parents + 1)]
+    places = np.concatenate([[[5.0, 0.0, 0.0]], BODY.rest_positions])
+    assert off_body(Skeleton(names, np.array(parents), places)) == [0]
+    assert off_body(BODY) == []
 
 
 def test_joints_that_were_not_seen_are_not_drawn():

@@ -144,7 +144,7 @@ def test_a_squat_is_as_deep_as_the_hips_go():
     hips = ("SpineBase", "HipLeft", "HipRight")
     # Legs are measured by their median length, so hips that bob leave it as it is.
     deep, half = moved(source, down, *hips), moved(source, 0.5 * down, *hips)
-    figures = ground_figures(deep, half, np.zeros(200), 1.7)
+    figures = ground_figures(deep, half, deep.positions, np.zeros(200), 1.7)
     assert figures.squat == pytest.approx(0.5, abs=0.01)
     assert figures.performer_squat == pytest.approx(0.3 / source.leg, rel=0.01)
 

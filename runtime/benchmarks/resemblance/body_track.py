@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from devices.bodies.body_plan import SIDES, BodyPlan, Chain, Limb
 from devices.bodies.joint_names import Side
+from devices.bodies.plan_by_names import plan_by_names
+from devices.skeleton import Skeleton
 
 Array = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -104,6 +106,13 @@ def bends(limb: Limb) -> Chain:
     """Shoulder, elbow and wrist, or hip, knee and ankle, as far as the limb has them."""
     ends = (limb.upper[0], limb.upper[-1])
     return (*ends, limb.lower[-1]) if limb.lower else ends
+
+
+def off_body(skeleton: Skeleton) -> list[int]:
+    """The joints that carry a body without being of it, such as a root on the floor."""
+    plan = plan_by_names(skeleton)
+    own = range(len(skeleton.names)) if plan is None else skeleton.tree.subtree(plan.hips)
+    return sorted(set(range(len(skeleton.names))).difference(own))
 
 
 def unit(vectors: Array) -> Array:

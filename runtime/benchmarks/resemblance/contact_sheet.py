@@ -14,6 +14,7 @@ from devices.bodies.joint_names import Side
 from devices.bodies.plan_by_names import plan_by_names
 from devices.skeleton import Skeleton
 from replay.recording import Recording
+from runtime.benchmarks.resemblance.body_track import off_body
 from runtime.output.files.whole_file import whole_file
 from runtime.output.pictures import on_black
 from runtime.show.show import Show
@@ -71,7 +72,8 @@ class ContactSheet:
         for number, line in enumerate(caption):
             pen.text((4, 2 + number * (_LETTERS + 4)), line, fill=_INK, font=font)
         recording = self._recording
-        sticks = recording.positions[list(self._moments)]
+        sticks = recording.positions[list(self._moments)].copy()
+        sticks[:, off_body(recording.skeleton)] = np.nan
         reach = _reach(sticks)
         moments = list(zip(self._moments, sticks, self._pictures, strict=False))
         for column, (frame, stick, picture) in enumerate(moments):

@@ -43,12 +43,13 @@ class GroundFigures:
 
 
 def ground_figures(
-    performer: BodyTrack, character: BodyTrack, lowest: Array, height: float
+    performer: BodyTrack, character: BodyTrack, positions: Array, lowest: Array, height: float
 ) -> GroundFigures:
     """Measure a performance.
 
     Args:
         performer, character: the same frames of both.
+        positions: (T, J, 3) [m] of all joints of the performer's body.
         lowest: (T,) [m] height of the character's lowest vertex.
         height: [m] of the character.
     """
@@ -58,7 +59,7 @@ def ground_figures(
         travel=far,
         performer_travel=theirs,
         slide=slide(performer, character),
-        hover=hover(performer.positions, lowest, height),
+        hover=hover(positions, lowest, height),
         squat=deep / their_deep if their_deep >= LEAST_SQUAT else np.nan,
         performer_squat=their_deep,
     )

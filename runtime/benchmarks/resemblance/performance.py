@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from devices.bodies.plan_by_names import plan_by_names
 from replay.recording import Recording
-from runtime.benchmarks.resemblance.body_track import BodyTrack
+from runtime.benchmarks.resemblance.body_track import BodyTrack, off_body
 from runtime.benchmarks.resemblance.steadiness import steps_of_joints
 from runtime.characters.character import Character
 from runtime.puppet.puppet import Motion
@@ -53,7 +53,7 @@ class Performance:
     Attributes:
         performer: as recorded, without any conditioning; None where no body is recognised.
         character: the posed nodes; None where no body is recognised, or no nodes are posed.
-        positions: (T, J, 3) [m] of the performer's joints.
+        positions: (T, J, 3) [m] of the performer's joints; NaN for those that are not of the body.
         lowest: (T,) [m] height of the character's lowest vertex.
         height: [m] of the character at rest.
         surface: figures of the surface.
@@ -98,13 +98,15 @@ def perform(
     ticks, stretch = report["stages_ms"]["frame"], report["stretch"]
     performer = plan_by_names(recording.skeleton)
     steps = np.array(watch.steps)
-    beyond = steps - steps_of_joints(recording.positions)[: len(steps)]
+    positions = recording.positions.copy()
+    positions[:, off_body(recording.skeleton)] = np.nan
+    beyond = steps - steps_of_joints(positions)[: len(steps)]
     return Performance(
         performer=None
         if performer is None
         else BodyTrack(recording.times, recording.positions, recording.rotations, performer),
         character=_posed(recording.times, character, motions),
-        positions=recording.positions,
+        positions=positions,
         lowest=np.array(watch.lowest),
         height=watch.height,
         surface=SurfaceFigures(

@@ -14,6 +14,7 @@ from runtime.benchmarks.resemblance.body_track import BodyTrack, angle, common_a
 
 Array = NDArray[np.float64]
 
+LEVEL = 0.5  # of its length along the floor; a head that looks up or down more steeply has no yaw
 LEAST_TURN = 3.0  # [degrees], standard deviation; what turns less shows nothing to keep
 
 
@@ -151,7 +152,7 @@ def _yaw(vectors: Array, *, quarter: bool = False) -> Array:
     """
     x, z = (vectors[:, 0], vectors[:, 2]) if not quarter else (-vectors[:, 2], vectors[:, 0])
     out = np.full(len(vectors), np.nan)
-    is_known = np.isfinite(x) & np.isfinite(z)
+    is_known = np.hypot(x, z) > LEVEL
     out[is_known] = np.degrees(np.unwrap(np.arctan2(x[is_known], z[is_known])))
     return out
 
