@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from runtime.characters.character import Character
 from runtime.characters.proxy import Proxy
@@ -23,7 +24,7 @@ from solvers.deform.stiff_segments import StiffSegments, find_stiff_segments
 from solvers.retarget.abstraction import abstract
 from solvers.skeleton.anchors import bind
 from solvers.skeleton.tree import Tree
-from solvers.surface.heat_weights import skin_of_heat
+from solvers.surface.heat_weights import is_rigid, skin_of_heat, skin_of_rigid_weights
 from solvers.surface.skin_weights import Skin, skin_of_weights
 
 Array = NDArray[np.float64]
@@ -122,7 +123,10 @@ class BoundSkeleton:
         """
         character, proxy = self._character, self._proxy
         if character.weights is not None:
-            return skin_of_weights(character.weights[proxy.kept])
+            weights = csr_array(character.weights[proxy.kept])
+            if is_rigid(weights):
+                return skin_of_rigid_weights(proxy.vertices, proxy.faces, weights)
+            return skin_of_weights(weights)
         tree = character.skeleton.tree
         if character.plan is not None:
             tree = tree.rerooted(character.plan.hips)

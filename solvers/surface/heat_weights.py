@@ -20,13 +20,17 @@ from solvers.linear.block_factor import BlockFactor
 from solvers.linear.laplacian import Floats, Ints, cotangent_laplacian, weighted_sums
 from solvers.linear.nested_dissection import dissect
 from solvers.surface.sightlines import ROOM, BoxTree, box_tree, is_blocked
-from solvers.surface.skin_weights import INFLUENCES, Skin
+from solvers.surface.skin_weights import INFLUENCES, Skin, skin_of_weights
 
 _TIE = 1e-4  # relative difference of distance between bones that share a vertex
 _TRIED = 16  # nearest bones that a vertex looks for
 _CLOSEST = 1e-3  # of the character's size: a bone on the surface is taken to be this far away
 _SEEN = 0.6  # least share of a part's vertices that see a bone, or all are taken to see theirs
 _SMALL = 0.25  # of the character's size: such a part that sees no bone is moved by one
+
+
+_BENT = 0.03  # of the size: how far rigid weights are spread
+_WHOLE = 0.999  # a weight that is the whole
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -93,6 +97,43 @@ def skin_of_heat(vertices: Floats, faces: Ints, parents: Ints, positions: Floats
     weights /= weights.sum(axis=1, keepdims=True)
     nodes = np.broadcast_to(owners, weights.shape)
     return Skin(nodes, weights).strongest(INFLUENCES)
+
+
+def skin_of_rigid_weights(vertices: Floats, faces: Ints, weights: sp.csr_array) -> Skin:
+    """Return a skin that bends where neighbouring vertices follow different nodes.
+
+    Files and wooden figures give each vertex to one node; where their surface goes on from one to
+    the next, it would tear. The weights are spread by heat over a share of the size, so that parts
+    which are apart stay rigid.
+
+    Args:
+        vertices: (N, 3) at rest.
+        faces: (F, 3).
+        weights: (N, K), one node a vertex.
+    """
+    used, column = np.unique(weights.tocoo().col, return_inverse=True)
+    entries = weights.tocoo()
+    given = np.zeros((len(vertices), len(used)))
+    given[entries.row, column] = entries.data
+    extent = max(float(np.ptp(vertices, axis=0).max()), 1e-30)
+    points = vertices / extent
+    areas = np.maximum(_areas(points, faces), 1e-12)
+    matrix = sp.csr_matrix(sp.diags(areas) + _BENT**2 * cotangent_laplacian(points, faces))
+    spread = np.maximum(_spread(matrix, points, areas[:, None] * given), 0.0)
+    return skin_of_weights(_on_nodes(spread, used, weights.shape[1]))
+
+
+def is_rigid(weights: sp.csr_array) -> bool:
+    """Whether each vertex follows one node alone, by weights (N, K)."""
+    return bool(len(weights.data)) and weights.nnz == weights.shape[0] == np.count_nonzero(
+        weights.data > _WHOLE
+    )
+
+
+def _on_nodes(spread: Floats, used: Ints, count: int) -> sp.csr_array:
+    """Weights of the used nodes (N, U) as weights of all (N, count), without the tiny ones."""
+    row, column = np.nonzero(spread > 1.0 - _WHOLE)
+    return sp.csr_array((spread[row, column], (row, used[column])), shape=(len(spread), count))
 
 
 def _bones_of(parents: Ints, positions: Floats) -> _Bones:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.sparse import csr_array
 
-from solvers.surface.heat_weights import skin_of_heat
+from solvers.surface.heat_weights import is_rigid, skin_of_heat, skin_of_rigid_weights
 from solvers.surface.skin_weights import Skin
 from tests.solvers.bars import bar
 
@@ -117,3 +118,29 @@ def test_broken_surfaces_get_finite_weights(name: str, nodes: np.ndarray) -> Non
 def test_a_single_node_moves_everything() -> None:
     skin = skin_of_heat(VERTICES, FACES, np.array([-1]), np.zeros((1, 3)))
     assert (dense(skin, 1) == 1.0).all()
+
+
+def one_node(owner: np.ndarray, count: int) -> csr_array:
+    """Weights (N, count) by which each vertex follows one node alone."""
+    rows = np.arange(len(owner))
+    return csr_array((np.ones(len(owner)), (rows, owner)), shape=(len(owner), count))
+
+
+def test_rigid_weights_are_spread_where_the_surface_goes_on() -> None:
+    x = VERTICES[:, 0]
+    rigid = one_node((x > 2.0).astype(np.int64), 3)
+    assert is_rigid(rigid)
+    weights = dense(skin_of_rigid_weights(VERTICES, FACES, rigid), 3)
+    np.testing.assert_allclose(weights.sum(axis=1), 1.0)
+    assert weights[x < 1.2, 1].max() < 0.01
+    assert weights[x > 2.8, 1].min() > 0.99
+    middle = weights[np.abs(x - 2.0) < 0.06, 1]
+    assert ((middle > 0.2) & (middle < 0.8)).all()
+
+
+def test_rigid_parts_that_are_apart_stay_rigid() -> None:
+    both = np.concatenate([VERTICES, VERTICES + [9.0, 0.0, 0.0]])
+    owner = np.repeat([0, 2], len(VERTICES))
+    faces = np.concatenate([FACES, FACES + len(VERTICES)])
+    weights = dense(skin_of_rigid_weights(both, faces, one_node(owner, 3)), 3)
+    np.testing.assert_allclose(weights[np.arange(len(owner)), owner], 1.0)
