@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import stat
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -45,10 +46,15 @@ def test_the_right_keys_open_and_the_wrong_ones_get_nothing(tmp_path: Path) -> N
         (stage / "bridge.key").write_bytes(
             (tmp_path / "other/capture/bridge.key_secret").read_bytes()
         )
+        with ThreadPoolExecutor() as pool:  # each waits for as long as it is told to
+            attempts = [
+                pool.submit(open_device, urlsplit(f"{url}?{keys}wait=5"))
+                for keys in (f"keys={stage}&", "")
+            ]
         with pytest.raises(InputError, match="no connection to the bridge"):
-            open_device(urlsplit(f"{url}?keys={stage}&wait=5"))
+            attempts[0].result()
         with pytest.raises(InputError, match="one side has keys and the other has none"):
-            open_device(urlsplit(f"{url}?wait=5"))
+            attempts[1].result()
         told.wait_for("one side has keys and the other has none")
         assert publisher.subscribers.sent == 1, "nobody else got anything"
 

@@ -46,10 +46,10 @@ with Show(
     characters,
     ShowSettings(characters=tuple(settings)),
 ) as show:
-    for index in range(30):
+    for index in range(12):
         show.tick()
         show.settle()
-        if index % 10 == 9:
+        if index % 4 == 3:
             ACTIONS["freeze"].press(show.controls)
 VmcDecoder()
 proxy_of(characters[0], dense=0, count=2_000)

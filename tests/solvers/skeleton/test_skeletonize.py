@@ -94,9 +94,16 @@ def test_a_tube_becomes_its_axis_from_tip_to_tip() -> None:
     assert bones.max() < 1.5 * bones.min()
 
 
-def test_three_capsules_become_one_branch_node_with_a_limb_to_each_tip() -> None:
-    tips = np.array([[0.0, 4.0, 0.0], [3.0, -3.0, 0.0], [-3.0, -3.0, 0.5]])
-    tree = _skeleton(_capsules(tips, [0.4] * 3))
+TIPS = np.array([[0.0, 4.0, 0.0], [3.0, -3.0, 0.0], [-3.0, -3.0, 0.5]])
+
+
+@pytest.fixture(scope="module")
+def of_capsules() -> Tree:
+    return _skeleton(_capsules(TIPS, [0.4] * 3))
+
+
+def test_three_capsules_become_one_branch_node_with_a_limb_to_each_tip(of_capsules: Tree) -> None:
+    tips, tree = TIPS, of_capsules
     assert len(tree.leaves) == 3
     assert np.count_nonzero(tree.degree > 2) == 1
     fork = tree.positions[np.argmax(tree.degree)]
@@ -140,11 +147,10 @@ def test_a_seam_that_splits_every_vertex_changes_nothing() -> None:
     )
 
 
-def test_same_surface_same_bits() -> None:
-    mesh = _capsules(np.array([[0.0, 4.0, 0.0], [3.0, -3.0, 0.0], [-3.0, -3.0, 0.5]]), [0.4] * 3)
-    first, second = extract_skeleton(*mesh), extract_skeleton(*mesh)
-    assert first[0].tobytes() == second[0].tobytes()
-    assert first[1].tobytes() == second[1].tobytes()
+def test_same_surface_same_bits(of_capsules: Tree) -> None:
+    parents, positions = extract_skeleton(*_capsules(TIPS, [0.4] * 3))
+    assert parents.tobytes() == of_capsules.parents.tobytes()
+    assert positions.tobytes() == of_capsules.positions.tobytes()
 
 
 @pytest.mark.parametrize("scale", [1e-8, 1e8])
