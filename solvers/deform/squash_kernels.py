@@ -11,6 +11,7 @@ Source: Celikcan, Yaz and Capin 2015, section 4.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 from numba import get_thread_id, prange  # type: ignore[attr-defined]  # numba exports it untyped
@@ -29,6 +30,9 @@ LEAST_SCALE, LARGEST_SCALE = 0.2, 5.0
 
 _TINY = 1e-300
 
+_Rotate = Callable[[Floats, int, Floats], None]
+_Shape = Callable[[Floats, int, Planes, float, tuple[Floats, Floats]], None]
+
 
 class Fit(NamedTuple):
     """The arrays that a local step writes; a named tuple, because compiled kernels accept those.
@@ -41,6 +45,9 @@ class Fit(NamedTuple):
     scales: Floats
     laplace_x: Floats
     room: Floats
+
+
+_LocalStep = Callable[[Floats, Cells, Planes, float, Fit], None]
 
 
 @parallel_kernel
@@ -56,59 +63,9 @@ def rest_covariances(rest: Floats, cells: Cells, out: Fit) -> None:
                 matrices[first + k, entry] = lanes[entry * LANES + k]
 
 
-@parallel_kernel
-def fit_scaled_cells(x: Floats, cells: Cells, planes: Planes, cartoon: float, out: Fit) -> None:
-    """The shape state's local step: s_i R_i of each cell, with s_i - 1 multiplied by `cartoon`.
-
-    Source: Celikcan et al. 2015, eqs. (5), (6) and (8).
-    """
-    matrices, scales, laplace_x, room = out
-    count = len(cells.starts) - 1
-    for block in prange((count + LANES - 1) // LANES):
-        lanes, first = room[get_thread_id()], block * LANES
-        covariances(x, cells, first, min(LANES, count - first), lanes, laplace_x)
-        fit_rotations(lanes, min(LANES, count - first))
-        _scale_block(lanes, first, planes, cartoon, (matrices, scales))
-
-
-@parallel_kernel
-def scale_cells(x: Floats, cells: Cells, planes: Planes, cartoon: float, out: Fit) -> None:
-    """Like `fit_scaled_cells`, with the rotations that `out` already holds."""
-    matrices, scales, laplace_x, room = out
-    count = len(cells.starts) - 1
-    for block in prange((count + LANES - 1) // LANES):
-        lanes, first = room[get_thread_id()], block * LANES
-        covariances(x, cells, first, min(LANES, count - first), lanes, laplace_x)
-        _load_rotations(lanes, first, matrices)
-        _scale_block(lanes, first, planes, cartoon, (matrices, scales))
-
-
-@parallel_kernel
-def fit_pose_cells(x: Floats, cells: Cells, planes: Planes, gain: float, out: Fit) -> None:
-    """The pose state's local step: V_i R_i of each cell, and the scale on its primary axis.
-
-    Source: Celikcan et al. 2015, eqs. (8) and (10) to (12), the axis from the stretch in the
-    cell's plane; see `solvers.squash_stretch`.
-    """
-    matrices, scales, laplace_x, room = out
-    count = len(cells.starts) - 1
-    for block in prange((count + LANES - 1) // LANES):
-        lanes, first = room[get_thread_id()], block * LANES
-        covariances(x, cells, first, min(LANES, count - first), lanes, laplace_x)
-        fit_rotations(lanes, min(LANES, count - first))
-        _pose_block(lanes, first, planes, gain, (matrices, scales))
-
-
-@parallel_kernel
-def pose_cells(x: Floats, cells: Cells, planes: Planes, gain: float, out: Fit) -> None:
-    """Like `fit_pose_cells`, with the rotations that `out` already holds."""
-    matrices, scales, laplace_x, room = out
-    count = len(cells.starts) - 1
-    for block in prange((count + LANES - 1) // LANES):
-        lanes, first = room[get_thread_id()], block * LANES
-        covariances(x, cells, first, min(LANES, count - first), lanes, laplace_x)
-        _load_rotations(lanes, first, matrices)
-        _pose_block(lanes, first, planes, gain, (matrices, scales))
+@kernel
+def _fit_rotations(lanes: Floats, first: int, R: Floats) -> None:
+    fit_rotations(lanes, min(LANES, len(R) - first))
 
 
 @kernel
@@ -232,3 +189,41 @@ def _volume_scales(lanes: Floats, size: int, gain: float) -> None:
         lanes[2 * LANES + k] = (g - c) * lean * fab
         lanes[3 * LANES + k] = c - off + (g - c) * (0.5 - lean * half)
         lanes[4 * LANES + k] = off
+
+
+def _local_step(rotate: _Rotate, shape: _Shape) -> _LocalStep:
+    """A local step: the cells' covariances, then `rotate`, then `shape`, LANES cells at a time."""
+
+    @parallel_kernel
+    def step(x: Floats, cells: Cells, planes: Planes, amount: float, out: Fit) -> None:
+        matrices, scales, laplace_x, room = out
+        count = len(cells.starts) - 1
+        for block in prange((count + LANES - 1) // LANES):
+            lanes, first = room[get_thread_id()], block * LANES
+            covariances(x, cells, first, min(LANES, count - first), lanes, laplace_x)
+            rotate(lanes, first, matrices)
+            shape(lanes, first, planes, amount, (matrices, scales))
+
+    return step
+
+
+fit_scaled_cells = _local_step(_fit_rotations, _scale_block)
+"""`fit_scaled_cells(x, cells, planes, cartoon, out)`: the shape state's local step.
+
+It gives s_i R_i of each cell, with s_i - 1 multiplied by `cartoon`.
+Source: Celikcan et al. 2015, eqs. (5), (6) and (8).
+"""
+
+scale_cells = _local_step(_load_rotations, _scale_block)
+"""Like `fit_scaled_cells`, with the rotations that `out` already holds."""
+
+fit_pose_cells = _local_step(_fit_rotations, _pose_block)
+"""`fit_pose_cells(x, cells, planes, gain, out)`: the pose state's local step.
+
+It gives V_i R_i of each cell, and the scale on its primary axis.
+Source: Celikcan et al. 2015, eqs. (8) and (10) to (12), the axis from the stretch in the cell's
+plane; see `solvers.squash_stretch`.
+"""
+
+pose_cells = _local_step(_load_rotations, _pose_block)
+"""Like `fit_pose_cells`, with the rotations that `out` already holds."""
