@@ -11,7 +11,6 @@ from functools import reduce
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.interpolate import PchipInterpolator, make_interp_spline
 from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
@@ -144,6 +143,8 @@ def grown(by: float, *fields: Field) -> Field:
 
 def curve(points: Sequence[ArrayLike], count: int) -> Array:
     """A smooth curve through `points`, as `count` points (count, 3) evenly spaced along it."""
+    from scipy.interpolate import make_interp_spline  # noqa: PLC0415  # slow to import
+
     knots = np.asarray(points, dtype=np.float64)
     spans = np.linalg.norm(np.diff(knots, axis=0), axis=1)
     places = np.concatenate([[0.0], np.cumsum(np.sqrt(spans))])
@@ -156,6 +157,8 @@ def curve(points: Sequence[ArrayLike], count: int) -> Array:
 
 def taper(values: Sequence[float], count: int) -> Array:
     """Radii (count,) that run smoothly, without overshoot, through evenly spaced `values`."""
+    from scipy.interpolate import PchipInterpolator  # noqa: PLC0415  # slow to import
+
     places = np.linspace(0.0, 1.0, len(values))
     radii: Array = PchipInterpolator(places, values)(np.linspace(0.0, 1.0, count))
     return radii
