@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from devices.skeleton import Skeleton, SkeletonFrame
 from solvers.kernels.compiled import exact_kernel
+from solvers.kernels.short_loops import median, put
 
 KEEP_SECONDS = 0.5
 EASE_SECONDS = 1.0
@@ -156,10 +157,10 @@ def _fill(
         scale = _scale(joints)
         _guess(joints, scale, time, keep, ease)
         if np.isnan(root[0]):
-            root[:] = joints[joints[0].order].rest * scale
+            put(root, joints[joints[0].order].rest * scale)
         _place(joints, positions, filled, root)
     _remember(joints, positions, filled, time)
-    root[:] = positions[joints[0].order]
+    put(root, positions[joints[0].order])
 
 
 @exact_kernel
@@ -197,7 +198,7 @@ def _scale(joints: Records) -> float:
         if joint.count > 0 and joint.length > 0.0:
             ratios[known] = joint.length / _length(joint.rest)
             known += 1
-    return float(np.median(ratios[:known])) if known > 0 else 1.0
+    return median(ratios[:known]) if known > 0 else 1.0
 
 
 @exact_kernel
@@ -206,9 +207,9 @@ def _guess(joints: Records, scale: float, time: float, keep: float, ease: float)
     for joint in joints:
         age = time - joint.seen_at - keep
         if age <= 0.0:
-            joint.guess[:] = joint.offset
+            put(joint.guess, joint.offset)
         elif age >= ease:
-            joint.guess[:] = joint.rest * scale
+            put(joint.guess, joint.rest * scale)
         else:
             w = age / ease
             turn(joint.offset, joint.rest * scale, w * w * (3.0 - 2.0 * w), joint.guess)
@@ -219,17 +220,17 @@ def _place(joints: Records, positions: Array, filled: Bools, root: Array) -> Non
     """Place the joints to fill at their assumed offsets."""
     placed, order = ~filled, joints["order"]
     if filled[order[0]]:
-        positions[order[0]] = root
+        put(positions[order[0]], root)
         placed[order[0]] = True
         joint = _nearest_seen(order, filled)
         while joint != order[0]:
             parent = joints[joint].parent
-            positions[parent] = positions[joint] - joints[joint].guess
+            put(positions[parent], positions[joint] - joints[joint].guess)
             placed[parent] = True
             joint = parent
     for joint in order:
         if not placed[joint]:
-            positions[joint] = positions[joints[joint].parent] + joints[joint].guess
+            put(positions[joint], positions[joints[joint].parent] + joints[joint].guess)
 
 
 @exact_kernel
@@ -246,7 +247,7 @@ def _remember(joints: Records, positions: Array, filled: Bools, time: float) -> 
     # the offset from the guess is what keeps the joint still when it disappears.
     for index, joint in enumerate(joints):
         if not filled[index]:
-            joint.offset[:] = positions[index] - positions[joint.parent]
+            put(joint.offset, positions[index] - positions[joint.parent])
             joint.seen_at = time
 
 
@@ -259,7 +260,7 @@ def turn(start: Array, end: Array, weight: float, out: Array) -> None:
     """
     before, after = _length(start), _length(end)
     if min(before, after) <= 1e-9:
-        out[:] = (1.0 - weight) * start + weight * end
+        put(out, (1.0 - weight) * start + weight * end)
         return
     a, b = start / before, end / after
     cosine = min(max((a * b).sum(), -1.0), 1.0)
@@ -268,11 +269,13 @@ def turn(start: Array, end: Array, weight: float, out: Array) -> None:
     if sine < 1e-6:
         least = np.zeros(3)
         least[np.argmin(np.abs(a))] = 1.0
-        side = np.cross(a, least)
+        side[0] = a[1] * least[2] - a[2] * least[1]
+        side[1] = a[2] * least[0] - a[0] * least[2]
+        side[2] = a[0] * least[1] - a[1] * least[0]
     side /= max(_length(side), 1e-12)
     angle = weight * np.arctan2(sine, cosine)
     length = (1.0 - weight) * before + weight * after
-    out[:] = length * (np.cos(angle) * a + np.sin(angle) * side)
+    put(out, length * (np.cos(angle) * a + np.sin(angle) * side))
 
 
 @exact_kernel

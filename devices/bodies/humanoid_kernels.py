@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.kernels.compiled import exact_kernel
+from solvers.kernels.short_loops import median, put
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -141,11 +142,11 @@ def pose_in_world(
     for joint in structure.order:
         above = structure.parents[joint]
         if above < 0 or bones.pinned[joint]:
-            out.positions[joint] = offsets[joint]
-            out.rotations[joint] = turns[joint]
+            put(out.positions[joint], offsets[joint])
+            put(out.rotations[joint], turns[joint])
         else:
             _rotate(out.rotations[above], offsets[joint], out.positions[joint])
-            out.positions[joint] += out.positions[above]
+            put(out.positions[joint], out.positions[joint] + out.positions[above])
             _multiply(out.rotations[above], turns[joint], out.rotations[joint])
     _judge(bones, structure.seen, tracking, out)
 
@@ -172,14 +173,14 @@ def _complete(bones: Bones, structure: Structure, offsets: Array) -> None:
     given = usable.any() or offsets[hips].any()
     for joint in range(len(offsets)):
         if not (usable[joint] or (joint == hips and bones.sent[hips] and given)):
-            offsets[joint] = structure.defaults[joint] * scale
+            put(offsets[joint], structure.defaults[joint] * scale)
     for row in range(len(structure.shares)):
         absent, following = structure.along[row]
-        offsets[absent] = structure.shares[row] * offsets[following]
+        put(offsets[absent], structure.shares[row] * offsets[following])
     for joint in structure.order[::-1]:  # children first: a parent's offset is still its own
         above = structure.parents[joint]
         if above >= 0 and structure.absent[above]:
-            offsets[joint] -= offsets[above]
+            put(offsets[joint], offsets[joint] - offsets[above])
 
 
 @exact_kernel
@@ -199,11 +200,11 @@ def _check_offsets(given: Array, structure: Structure, sent: Mask, usable: Mask)
             ratios[joint] = length / structure.lengths[joint]
     if not usable.any():
         return 1.0
-    scale = np.median(ratios[usable])
+    scale = median(ratios[usable])
     for joint in range(len(given)):
         ratio = ratios[joint]
         usable[joint] &= scale / OUT_OF_PROPORTION < ratio < scale * OUT_OF_PROPORTION
-    return float(scale)
+    return scale
 
 
 @exact_kernel
@@ -211,12 +212,12 @@ def _place_pinned(hips: int, bones: Bones, offsets: Array, turns: Array) -> None
     """Place the hips on the model's root, and pinned joints at their world poses."""
     root_turn = bones.root[3:]
     _rotate(root_turn, offsets[hips], offsets[hips])
-    offsets[hips] += bones.root[:3]
+    put(offsets[hips], offsets[hips] + bones.root[:3])
     _multiply(root_turn, turns[hips], turns[hips])
     for joint in range(len(turns)):
         if bones.pinned[joint]:
-            offsets[joint] = bones.pinned_positions[joint]
-            turns[joint] = bones.pinned_rotations[joint]
+            put(offsets[joint], bones.pinned_positions[joint])
+            put(turns[joint], bones.pinned_rotations[joint])
 
 
 @exact_kernel
@@ -234,6 +235,8 @@ def _judge(bones: Bones, seen: Mask, tracking: bool, out: WorldPose) -> None:
             out.rotations[joint] = np.nan
 
 
+# Not those of solvers.kernels.quaternion, whose sums may be reordered: poses that arrive are to
+# come out in the same bits on every processor, and the sums below are added in another order.
 @exact_kernel
 def _rotate(q: Array, v: Array, out: Array) -> None:
     """Rotate a vector (3,) by a unit quaternion; `out` may be `v`."""

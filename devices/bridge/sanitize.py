@@ -39,4 +39,5 @@ def make_safe(positions: Array, confidence: Array, quaternions: Array) -> None:
         if not (np.abs(quaternions[joint]) <= _LARGEST).all() or length < _UNIT:
             quaternions[joint] = np.nan
         elif abs(length - 1.0) > _UNIT:
-            quaternions[joint] /= length
+            for axis in range(4):
+                quaternions[joint, axis] /= length

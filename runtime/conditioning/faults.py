@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from replay.fill import was_seen
 from runtime.conditioning.body_anatomy import BodyAnatomy
 from solvers.kernels.compiled import kernel
+from solvers.kernels.short_loops import put
 from solvers.signal.continuity import LEAST_WRONG, distance, exchanged, expect
 
 Array = NDArray[np.float64]
@@ -242,7 +243,7 @@ def _confirmed(joint: Record, place: Array, time: float, cut: bool) -> bool:
     joint.doubts = joint.doubts + 1 if still else 1
     if joint.doubts == 1:
         joint.doubted_at = time
-    joint.doubted[:] = place
+    put(joint.doubted, place)
     if joint.doubts < CONFIRMED_CUT:
         return False
     return cut or bool(time - joint.doubted_at >= CONFIRMED_SECONDS)
@@ -300,10 +301,10 @@ def _believe(joints: Records, positions: Array, time: float) -> None:
             continue
         gap = time - joint.at
         if abs(gap) < FORGET:
-            joint.velocity[:] = (place - joint.place) / max(gap, VELOCITY_SECONDS)
+            put(joint.velocity, (place - joint.place) / max(gap, VELOCITY_SECONDS))
             joint.times += 1
         else:
             joint.velocity[:] = 0.0
             joint.times = 1
-        joint.place[:] = place
+        put(joint.place, place)
         joint.at = time

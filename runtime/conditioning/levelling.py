@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from runtime.conditioning.body_anatomy import BodyAnatomy
 from solvers.kernels.compiled import kernel
+from solvers.kernels.short_loops import put
 from solvers.signal.floor_plane import FloorFit, FloorState, upright
 
 Array = NDArray[np.float64]
@@ -119,13 +120,14 @@ def _standing(feet: Records, positions: Array, filled: Bools, reach: float) -> A
     for index, foot in enumerate(feet):
         place = positions[foot.joint]
         foot.still = ((place - foot.place) ** 2).sum() < reach**2 and not filled[foot.joint]
-        foot.place[:] = soles[index] = place
+        put(foot.place, place)
+        put(soles[index], place)
         soles[index, 1] -= foot.rest
     lowest = soles[:, 1].min()
     count = 0
     for index, foot in enumerate(feet):
         if foot.still and soles[index, 1] < lowest + LOWEST:
-            soles[count] = soles[index]
+            put(soles[count], soles[index])
             count += 1
     return soles[:count]
 

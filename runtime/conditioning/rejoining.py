@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.kernels.compiled import kernel
+from solvers.kernels.short_loops import put
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -85,7 +86,7 @@ def _move_back(
     for index, joint in enumerate(joints):
         place = positions[index]
         if joint.filled and not filled[index]:
-            joint.off[:] = joint.shown - place
+            put(joint.off, joint.shown - place)
             far = (joint.off**2).sum() > NEARLY**2
             joint.since = time if far else -np.inf
         passed = (time - joint.since) / SECONDS
@@ -93,5 +94,5 @@ def _move_back(
             left = 1.0 - passed
             place += joint.off * (left * left * (3.0 - 2.0 * left))
             on_the_way[index] = True
-        joint.shown[:] = place
+        put(joint.shown, place)
         joint.filled = filled[index]

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+import statistics
 from dataclasses import dataclass
-from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
 
 from devices.skeleton import Skeleton
 from solvers.kernels.compiled import kernel
+from solvers.kernels.short_loops import median
 from solvers.signal.continuity import distance
 
 Array = NDArray[np.float64]
@@ -80,7 +81,7 @@ class Stature:
         if math.isnan(self._until):
             self._until = time + SECONDS
         self._sizes.append(size)
-        size = median(self._sizes)
+        size = statistics.median(self._sizes)
         self.factor = 1.0
         if abs(size - 1.0) > SAME:
             self.factor = 1.0 / min(max(size, 1.0 / MOST), MOST)
@@ -95,4 +96,4 @@ def _size(positions: Array, filled: Bools, far: Indices, near: Indices, rest: Ar
         if not (filled[far[bone]] or filled[near[bone]]):
             ratios[seen] = distance(positions[far[bone]], positions[near[bone]]) / length
             seen += 1
-    return float(np.median(ratios[:seen])) if seen > 0 else np.nan
+    return median(ratios[:seen]) if seen > 0 else np.nan

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from solvers.deform.rotation_fit import LANES, SCRATCH, fit_rotations
 from solvers.kernels.compiled import kernel, parallel_kernel
 from solvers.kernels.quaternion import Quaternion, Vector
+from solvers.kernels.short_loops import put
 from solvers.linear.laplacian import Floats, Ints
 
 KEPT = 4  # groups that move a vertex
@@ -53,7 +54,8 @@ def _fit_motions(source: Floats, target: Floats, group_of: Ints, count: int) -> 
     covariance, centre = _covariances(source, target, together, np.zeros((1, 6)))
     overall = _rotations(covariance, np.eye(3).ravel())[0]
     empty = np.empty((count, 6))
-    empty[:] = centre[0]
+    for g in range(count):
+        put(empty[g], centre[0])
     covariances, centres = _covariances(source, target, group_of, empty)
     return _dual_quaternions(_rotations(covariances, overall), centres)
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.kernels.compiled import kernel
+from solvers.kernels.short_loops import put
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -61,7 +62,8 @@ def rank_assignments(values: Array, starts: Ints, limit: int) -> tuple[Ints, Int
             merit[best] = _assign(block, required[best], barred[best], columns[best])
             solved[best] = 1
             continue
-        taken[found], pairs[found], sums[found] = table[best], columns[best], merit[best]
+        taken[found], sums[found] = table[best], merit[best]
+        put(pairs[found], columns[best])
         found += 1
         merit[best] = -np.inf
         forced = required[best]
@@ -106,9 +108,11 @@ def _assign(block: Array, required: int, barred: int, columns: Ints) -> float:
     for j in range(costs.shape[1]):
         bit = np.int64(1) << j
         if barred & bit:
-            costs[:, j] += _BARRED
+            for i in range(len(costs)):
+                costs[i, j] += _BARRED
         elif required & bit:
-            costs[:, j] -= _BARRED
+            for i in range(len(costs)):
+                costs[i, j] -= _BARRED
     owner = _hungarian(costs)
     columns[:] = -1
     total, used = 0.0, np.int64(0)

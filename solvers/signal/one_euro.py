@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solvers.kernels.compiled import kernel
+from solvers.kernels.short_loops import put
 
 Array = NDArray[np.float64]
 
@@ -127,4 +128,4 @@ def _smooth(
         speed = np.sqrt((point.velocity**2).sum())
         share = smoothing_factor(least + coefficient * speed, dt)
         point.smooth += share * (sample - point.smooth)
-        point.raw[:] = sample
+        put(point.raw, sample)

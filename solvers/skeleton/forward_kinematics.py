@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 
 from solvers.kernels.compiled import kernel
 from solvers.kernels.quaternion import normalized, rotate
+from solvers.kernels.short_loops import put
 from solvers.skeleton.tree import Tree
 
 Array = NDArray[np.float64]
@@ -141,8 +142,9 @@ def _forward(
     for step in range(len(links)):
         node, parent = links[step, 0], links[step, 1]
         if parent < 0:
-            rotations[node] = bones[node] = np.array([0.0, 0.0, 0.0, 1.0])
-            positions[node] = rest[node]
+            put(rotations[node], (0.0, 0.0, 0.0, 1.0))
+            put(bones[node], (0.0, 0.0, 0.0, 1.0))
+            put(positions[node], rest[node])
             continue
         above = rotations[parent]
         bone = (above[0], above[1], above[2], above[3])
