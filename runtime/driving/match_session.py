@@ -19,6 +19,7 @@ from runtime.driving.mapping import Mapping
 from runtime.driving.performer import Performer, Pose, Rest, rest_state
 from runtime.driving.polyline_driver import PolylineDriver
 from runtime.driving.puppet_match import Choices, PuppetMatch, PuppetMatchState
+from runtime.driving.reach import Reach
 from runtime.puppet.puppet import Puppet
 from solvers.retarget.limb_shapes import most_different_poses
 from solvers.retarget.source_limbs import simplify
@@ -130,7 +131,7 @@ class MatchSession:
         """Whether enough of the driving joints are in view to strike a pose."""
         return bool(np.mean(frame.confidence[self._performer.joints] > 0.0) >= LEAST_SEEN)
 
-    def rehearse(self, poses: Sequence[Pose], clip: Sequence[Pose]) -> Array:
+    def rehearse(self, poses: Sequence[Pose], clip: Sequence[Pose]) -> list[Reach]:
         """Let each puppet perform from the one of these poses that is most like it.
 
         A recorded performer cannot be asked to strike a pose, so the recording is looked through
@@ -142,7 +143,7 @@ class MatchSession:
             clip: every pose of the recording if `needs_clip`, else a selection.
 
         Returns:
-            (A, 2, 3) [m] for each puppet the corners of all that it fills in those poses.
+            For each puppet the room that it takes in those poses.
         """
         view = self._view()
         evenly = np.unique(np.linspace(0, len(poses) - 1, CHOICES).round().astype(int))
@@ -152,7 +153,7 @@ class MatchSession:
         self.matching = False
         facing = np.array([pose.facing(0.0) - pose.hips for pose in poses])
         tried = [poses[index] for index in most_different_poses(facing, TRIED)]
-        return np.array([match.try_out(tried) for match in self._matches])
+        return [match.try_out(tried, poses) for match in self._matches]
 
     def direct(self, frame: SkeletonFrame) -> None:
         """While matching, show the best match of the newest pose; accept it in time."""

@@ -15,6 +15,7 @@ from runtime.driving.mapping import Drive, Mapping
 from runtime.driving.pairing import Pairing
 from runtime.driving.performer import Performer, Pose, Rest
 from runtime.driving.polyline_driver import STRAIGHT_ON
+from runtime.driving.reach import Reach, reach_of
 from runtime.driving.turn_limits import box_of, corners_of, limit_turns
 from runtime.puppet.puppet import Puppet
 from solvers.matching import SIZE_PREFERENCE, Match, TargetHierarchy
@@ -188,17 +189,22 @@ class PuppetMatch:
             self._driver.show(mapping, view)
         self.perform(rest, view)
 
-    def try_out(self, poses: Sequence[Pose]) -> Array:
-        """Limit the turns to what the surface can follow in these poses, if a mapping drives.
+    def try_out(self, tried: Sequence[Pose], poses: Sequence[Pose]) -> Reach:
+        """Limit the turns to what the surface can follow in some poses, if a mapping drives.
+
+        Args:
+            tried: at least one pose that the surface tries.
+            poses: all poses of the rehearsal.
 
         Returns:
-            (2, 3) [m] least and greatest corner of all that the puppet fills in them, on the stage.
+            The room that the puppet takes in them.
         """
         if isinstance(self._driver, MappedDriver):
-            return limit_turns(self.puppet, self._driver, poses)
-        boxes = np.array([box_of(self.puppet.attempt(pose)) for pose in poses])
-        self.puppet.forget()
-        return corners_of(boxes)
+            around = limit_turns(self.puppet, self._driver, tried)
+        else:
+            around = corners_of(np.array([box_of(self.puppet, pose) for pose in tried]))
+            self.puppet.forget()
+        return reach_of(self._driver, self.puppet.root, around, poses)
 
     def stop(self) -> None:
         """Stop driving the puppet, which goes back to its rest pose; the mapping stays shown."""

@@ -9,8 +9,7 @@ from replay.recording import Recording
 from runtime.conditioning.switches import Conditioning
 from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer
-
-Array = NDArray[np.float64]
+from runtime.driving.reach import Reach
 
 POSES = 500  # evenly through the recording
 LED_THERE = 8  # frames that are followed up to each of them
@@ -22,7 +21,7 @@ def rehearse(
     match_session: MatchSession,
     conditioning: Conditioning | None = None,
     part: int = 0,
-) -> Array | None:
+) -> list[Reach] | None:
     """Let a match session choose matches and rest states from poses of the whole recording.
 
     Where too few joints are in view in every pose, nothing is chosen; the session then matches as
@@ -37,8 +36,7 @@ def rehearse(
         part: which performer, in the order in which they appear, from 0.
 
     Returns:
-        (A, 2, 3) [m] for each puppet the corners of all that it fills, for the camera; None when
-        nothing was chosen.
+        For each puppet the room that it takes, for the camera; None when nothing was chosen.
     """
     who, first = np.unique(recording.performers, return_index=True)
     if part >= len(who):

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from runtime.driving.driver import MappedDriver
 from runtime.driving.performer import Pose
-from runtime.puppet.puppet import Motion, Puppet
+from runtime.puppet.puppet import Puppet
 from solvers.signal.histogram import Counts, count, percentile
 
 Array = NDArray[np.float64]
@@ -39,7 +39,7 @@ def limit_turns(puppet: Puppet, driver: MappedDriver, poses: Sequence[Pose]) -> 
         poses: T poses of the performer.
 
     Returns:
-        (2, 3) [m] least and greatest corner of all that the puppet fills meanwhile, on the stage.
+        (2, 3) [m] least and greatest corner of all that the puppet fills meanwhile, in place.
     """
     trial = _Trial(puppet, driver, poses)
     for _ in range(ROUNDS):
@@ -54,9 +54,12 @@ def limit_turns(puppet: Puppet, driver: MappedDriver, poses: Sequence[Pose]) -> 
     return corners_of(trial.boxes)
 
 
-def box_of(motion: Motion) -> Array:
-    """Return the least and greatest corner (2, 3) [m] of a character on the stage."""
-    return np.array([motion.vertices.min(axis=0), motion.vertices.max(axis=0)])
+def box_of(puppet: Puppet, pose: Pose) -> Array:
+    """Try a pose, and return the least and greatest corner (2, 3) [m] of the puppet in place."""
+    vertices = puppet.attempt(pose).vertices
+    box = np.array([vertices.min(axis=0), vertices.max(axis=0)])
+    box[:, ::2] -= puppet.travelled
+    return box
 
 
 def corners_of(boxes: Array) -> Array:
@@ -109,7 +112,7 @@ class _Trial:
     def attempt(self, number: int) -> None:
         """Try one pose."""
         self._gains[number] = self._driver.gains
-        self.boxes[number] = box_of(self._puppet.attempt(self._poses[number]))
+        self.boxes[number] = box_of(self._puppet, self._poses[number])
         stretch = self._puppet.surface.stretch
         self.all_edges[number] = self.limb_edges[number] = 0
         count(stretch, _BIN, self.all_edges[number])

@@ -159,6 +159,17 @@ class Puppet:
             self.driver.reset()
 
     @property
+    def root(self) -> Array:
+        """(3,) [m] the root node at rest; the whole character turns about it."""
+        return self._root
+
+    @property
+    def travelled(self) -> Array:
+        """(2,) [m] along x and z, how far it is from where it would stand in place."""
+        travelled: Array = self._stance.shift[::2]
+        return travelled
+
+    @property
     def highlights(self) -> list[Highlight]:
         """The driver's highlights, on the stage."""
         if self.driver is None:

@@ -106,6 +106,11 @@ class Camera:
         shift = height * (right * self.view_rotation[0] + up * self.view_rotation[1])
         return _placed(self, np.add(self.eye, shift), np.add(self.target, shift))
 
+    def moved(self, shift: ArrayLike, factor: float) -> Camera:
+        """Return a camera with its target shifted (3,) [m], `factor` times as far from it."""
+        target = np.add(self.target, shift)
+        return _placed(self, target + factor * np.subtract(self.eye, self.target), target)
+
     def zoom(self, factor: float) -> Camera:
         """Return a camera `factor` times closer to the target."""
         distance = min(max(self.distance / factor, 0.05), 500.0)

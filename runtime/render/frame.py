@@ -99,11 +99,36 @@ def _box_to_clip(
     return matrix
 
 
+@dataclass(frozen=True, slots=True)
+class StageSet:
+    """Where the curtain hangs, in a ring round the characters.
+
+    Attributes:
+        x, z: [m] its centre.
+        radius: [m].
+        slide: [m] by which its cloth slides along it, to the left.
+    """
+
+    x: float
+    z: float
+    radius: float
+    slide: float = 0.0
+
+
+def stage_set(marks: NDArray[np.float64], slide: float = 0.0) -> StageSet:
+    """Hang the curtain round places (R, 2) [m], x and z, where characters are or will be."""
+    low, high = marks.min(axis=0), marks.max(axis=0)
+    x, z = (low + high) / 2.0
+    radius = max(3.6, 0.62 * float((high - low).max()) + 2.6)
+    return StageSet(float(x), float(z), radius, slide)
+
+
 def frame_block(
     camera: Camera,
     size: tuple[int, int],
     light: Lighting,
     pools: NDArray[np.float64],
+    around: StageSet,
     *,
     on_floor: bool,
     reflected: bool = False,
@@ -115,6 +140,7 @@ def frame_block(
         size: width and height of the picture [px].
         light: the result of `lighting`.
         pools: (P, 3) x, z and radius [m] of each pool of light.
+        around: the curtain.
         on_floor: whether there is a floor; a floor hides everything below it.
         reflected: whether the block is for the reflection in the floor, upside down.
     """
@@ -123,7 +149,6 @@ def frame_block(
     view_projection = camera.projection(width / height) @ camera.view @ flip
     half = np.eye(4) * (0.5, 0.5, 0.5, 1.0)
     half[:3, 3] = 0.5, 0.5, 0.4985  # a small offset toward the light: no surface shadows itself
-    low, high = pools[:, :2].min(axis=0), pools[:, :2].max(axis=0)
     block = np.zeros((), dtype=FRAME)
     block["view_projection"] = view_projection.T
     block["inverse_view_projection"] = np.linalg.inv(view_projection).T
@@ -131,9 +156,9 @@ def frame_block(
     block["eye"] = (*(flip[:3, :3] @ np.asarray(camera.eye)), -1.0 if reflected else 1.0)
     block["key"] = (*KEY_DIRECTION, float(on_floor))
     block["floor_area"] = (*light.floor[:2], *(1.0 / light.floor[2:]))
-    radius = max(3.6, 0.62 * float((high - low).max()) + 2.6)
-    block["stage"] = (*((low + high) / 2.0), radius, len(pools))
-    block["picture"] = (width, height, height / (2.0 * np.tan(camera.fov / 2.0)), 0.0)
+    block["stage"] = (around.x, around.z, around.radius, len(pools))
+    pixels = height / (2.0 * np.tan(camera.fov / 2.0))
+    block["picture"] = (width, height, pixels, around.slide)
     block["pools"][: len(pools), :3] = pools
     return block
 

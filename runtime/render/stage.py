@@ -12,7 +12,16 @@ from runtime.render.background import Background
 from runtime.render.camera import Camera
 from runtime.render.caption import CaptionPainter
 from runtime.render.floor import Floor, ShadowMaps
-from runtime.render.frame import FRAME, MAX_POOLS, Lighting, covered, frame_block, lighting
+from runtime.render.frame import (
+    FRAME,
+    MAX_POOLS,
+    Lighting,
+    StageSet,
+    covered,
+    frame_block,
+    lighting,
+    stage_set,
+)
 from runtime.render.framebuffers import Framebuffers
 from runtime.render.inset import InsetPainter, SkeletonInset
 from runtime.render.programs import FRAME_BINDING, link, release_all
@@ -139,21 +148,33 @@ class Stage:
             self._framebuffers = self._make_framebuffers(size)
             self._kept_backdrop = b""
 
-    def draw(self, camera: Camera, inset: SkeletonInset | None = None) -> None:
-        """Draw the characters as they are now, seen by `camera`; `inset` shows the performer."""
+    def draw(
+        self,
+        camera: Camera,
+        inset: SkeletonInset | None = None,
+        around: StageSet | None = None,
+    ) -> None:
+        """Draw the characters as they are now.
+
+        Args:
+            camera: sees them.
+            inset: shows the performer.
+            around: the curtain; round the pools of light if None.
+        """
         light = lighting(self.boxes if self._characters else _EMPTY)
         pools = (
             np.array([character.pool for character in self._characters])
             if self._characters
             else _NO_POOLS
         )
+        around = around or stage_set(pools[:, :2])
         self._seen = covered(camera, self.size, self.boxes)
-        self._share(camera, light, pools)
+        self._share(camera, light, pools, around)
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._maps.draw(self._characters, light, contact=self._background is None)
         self._draw_characters(light)
         if self._background is None:
-            self._draw_floor_and_curtain(camera, pools)
+            self._draw_floor_and_curtain(repr((camera, around)).encode() + pools.tobytes())
         else:
             self._framebuffers.picture.clear()
         self._lay_over(camera, inset)
@@ -162,13 +183,16 @@ class Stage:
         if self._background is not None and self._background.alpha > 0:
             self._fill(UNDER, self._background.premultiplied)
 
-    def _share(self, camera: Camera, light: Lighting, pools: NDArray[np.float64]) -> None:
+    def _share(
+        self, camera: Camera, light: Lighting, pools: NDArray[np.float64], around: StageSet
+    ) -> None:
         for buffer, reflected in ((self._frame, False), (self._reflected_frame, True)):
             block = frame_block(
                 camera,
                 self.size,
                 light,
                 pools,
+                around,
                 on_floor=self._background is None,
                 reflected=reflected,
             )
@@ -190,7 +214,8 @@ class Stage:
         self._framebuffers.resolved.use()
         self._context.copy_framebuffer(self._framebuffers.resolved, self._framebuffers.characters)
 
-    def _draw_floor_and_curtain(self, camera: Camera, pools: NDArray[np.float64]) -> None:
+    def _draw_floor_and_curtain(self, wanted: bytes) -> None:
+        """Draw the floor and the curtain; `wanted` tells one backdrop from another."""
         self._reflected_frame.bind_to_uniform_block(FRAME_BINDING)
         self._framebuffers.reflection.use()
         self._framebuffers.reflection.clear()
@@ -200,7 +225,6 @@ class Stage:
         self._context.disable_direct(CLIP_DISTANCE0)
         self._frame.bind_to_uniform_block(FRAME_BINDING)
         self._context.disable(moderngl.DEPTH_TEST)
-        wanted = repr(camera).encode() + pools.tobytes()
         if wanted != self._kept_backdrop:
             self._framebuffers.backdrop.use()
             self._backdrop_array.render(moderngl.TRIANGLES, vertices=3)
@@ -243,7 +267,7 @@ class Stage:
         for character in self._characters:
             if character.caption:
                 depth = max(other.rest_box[1, 2] for other in self._characters)
-                near = character.position[2] + depth + 0.16
+                near = character.position[2] + character.spot[1] + depth + 0.16
                 foot = to_clip @ [character.pool[0], 0.0, near, 1.0]
                 at = (foot[:2] / foot[3] * 0.5 + 0.5) * self.size
                 self._caption.draw(

@@ -55,6 +55,7 @@ class StageCharacter:
     Attributes:
         caption: the text at its feet; empty for none.
         position: (3,) [m] the place of its origin on the stage.
+        spot: (2,) [m] along x and z, how far its pool of light is from there.
     """
 
     def __init__(
@@ -67,6 +68,7 @@ class StageCharacter:
     ) -> None:
         self.caption = caption
         self.position = np.array(position, dtype=np.float64).reshape(3)
+        self.spot = np.zeros(2)
         self._context = context
         self._programs = programs
         self._split = split_vertices(character)
@@ -143,7 +145,7 @@ class StageCharacter:
         low, high = self.rest_box + self.position
         half = (high - low)[[0, 2]] / 2.0
         centre = (low + high)[[0, 2]] / 2.0
-        return np.array([*centre, max(0.62, float(half.max()) + 0.38)])
+        return np.array([*(centre + self.spot), max(0.62, float(half.max()) + 0.38)])
 
     def draw_depth(self, to_clip: NDArray[np.float64]) -> None:
         """Draw into a depth map; `to_clip` (4, 4) maps world coordinates to its clip space."""

@@ -17,6 +17,7 @@ from runtime.conditioning.switches import Conditioning
 from runtime.output.output import Output, PerformedFrame
 from runtime.output.report.report import Report
 from runtime.puppet.puppet import Motion
+from runtime.render.glide import GlideState
 from runtime.show.act_group import Act, ActState
 from runtime.show.arrivals import Arrivals, ArrivalsState
 from runtime.show.clock import StageTimer
@@ -33,6 +34,7 @@ class FrameLoopState:
         motions: each puppet as it was performed last, with arrays of its own.
         unsettled: whether the surfaces are still to settle.
         pictured: [s] the show's time of the last picture.
+        scene: of the scene; None without one.
         frames, seconds: as of `FrameLoop`.
         began: [s] time of the first frame.
     """
@@ -42,6 +44,7 @@ class FrameLoopState:
     motions: tuple[Motion, ...]
     unsettled: bool
     pictured: float
+    scene: GlideState | None
     frames: int
     seconds: float
     began: float
@@ -154,6 +157,7 @@ class FrameLoop:
             _copies(self.motions),
             self._unsettled,
             self._pictures.snapshot(),
+            None if self._scene is None else self._scene.snapshot(),
             self.frames,
             self.seconds,
             self._began,
@@ -167,6 +171,8 @@ class FrameLoop:
         self.motions = list(_copies(state.motions))
         self._unsettled = state.unsettled
         self._pictures.restore(state.pictured)
+        if self._scene is not None and state.scene is not None:
+            self._scene.restore(state.scene)
         self.frames, self.seconds, self._began = state.frames, state.seconds, state.began
 
     def settle(self) -> None:
@@ -212,6 +218,8 @@ class FrameLoop:
         if not self.frozen:
             self.motions = motions
             self._unsettled = True
+        if self._scene is not None:
+            self._scene.follow(frame.time)
 
     def _count(self, frame: SkeletonFrame) -> None:
         self._began = frame.time if self.frames == 0 else self._began

@@ -7,8 +7,6 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from devices.errors import InputError
 from devices.stream import SkeletonStream
 from replay.playback import playback_of
@@ -243,13 +241,12 @@ class OpenedShow:
     def _rehearse(self, recording: Recording) -> None:
         """Let each act start from the best poses of the recording, and frame all they fill."""
         source = self._settings.match.source
-        filled = [
+        reaches = [
             rehearse(recording, source, act.match_session, self._conditioning, part)
             for part, act in enumerate(self.acts)
         ]
-        known = [corners for corners in filled if corners is not None]
-        if self.scene is not None:
-            self.scene.frame_all(np.concatenate(known) if len(known) == len(filled) else None)
+        if self.scene is not None and all(each is not None for each in reaches):
+            self.scene.frame_all([reach for own in reaches for reach in own or ()])
 
     def _check_export(self) -> None:
         """Refuse to export nodes that no driver poses, before a file is touched.

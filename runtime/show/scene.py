@@ -14,9 +14,12 @@ from runtime.characters.character import Character
 from runtime.control.ramp import Ramp
 from runtime.driving.driver import Highlight
 from runtime.driving.performer import Pose
+from runtime.driving.reach import Reach
 from runtime.puppet.puppet import Motion, Puppet
 from runtime.render.background import Background
-from runtime.render.camera import front_camera
+from runtime.render.camera import Camera, front_camera
+from runtime.render.frame import StageSet, stage_set
+from runtime.render.glide import Glide, GlideState
 from runtime.render.inset import SkeletonInset
 from runtime.render.stage import Stage
 from runtime.render.tubes import PAIR_COLOURS
@@ -26,6 +29,7 @@ if TYPE_CHECKING:
 
 GAP = 0.18  # [m] of floor between two characters
 BLACKOUT = 0.3  # [s] to black, and back to light
+LONG = 1.6  # times further back to frame the whole way: a longer way is followed
 ROOM = 0.12  # share of a character's size that stays in view around its rest pose
 
 
@@ -43,7 +47,8 @@ class Scene:
 
     Attributes:
         stage: draws the characters and the inset.
-        camera: the view of the picture.
+        camera: the view of the picture while the characters are at home; it glides after them,
+            unless all that they do fits into one picture.
         highlights: whether the drivers' highlights are drawn.
         blackout: 0 for light, 1 for black.
     """
@@ -76,29 +81,59 @@ class Scene:
         self._inset = None if plain else SkeletonInset(performer.parents)
         self.highlights = not plain
         self.camera = front_camera()
-        self._filled: NDArray[np.float64] | None = None
+        self._rest = self.stage.boxes
+        self._reaches: Sequence[Reach] | None = None
+        self._glide = Glide(len(puppets))
         self.frame_all()
 
-    def frame_all(self, filled: NDArray[np.float64] | None = None) -> None:
+    def frame_all(self, reaches: Sequence[Reach] | None = None) -> None:
         """Move the camera so that every character is in view, with room to move.
 
+        A short way over the stage is framed as a whole. A longer one is followed, and so is
+        whatever may come where nobody knows it, as in a live show.
+
         Args:
-            filled: (A, 2, 3) [m] corners of all that each puppet fills in the show, in its own
-                coordinates. If None, those given before; if none were, a guess by the rest poses.
+            reaches: the room that each puppet takes in the show. If None, those given before; if
+                none were, a guess by the rest poses.
         """
-        boxes = self.stage.boxes
-        self._filled = filled = self._filled if filled is None else filled
-        if filled is None:
-            room = ROOM * np.ptp(boxes, axis=1).max(axis=1)[:, None]
+        self._reaches = reaches = self._reaches if reaches is None else reaches
+        ways = np.zeros((len(self._rest), 2, 2))
+        if reaches is None:
+            room = ROOM * np.ptp(self._rest, axis=1).max(axis=1)[:, None]
+            boxes = self._rest.copy()
             boxes[:, 0, ::2] -= room
             boxes[:, 1] += room
         else:
-            places = np.array([character.position for character in self._characters])[:, None]
-            moved = filled + places
-            boxes = np.stack(
-                [np.minimum(boxes[:, 0], moved[:, 0]), np.maximum(boxes[:, 1], moved[:, 1])], axis=1
-            )
-        self.camera = self.camera.frame(boxes, self.stage.aspect)
+            boxes = self._with_rest([reach.around for reach in reaches])
+        camera, self._follows = self.camera.frame(boxes, self.stage.aspect), True
+        if reaches is not None and not any(puppet.travel.in_place for puppet in self._puppets):
+            all_ways = self._with_rest([reach.path for reach in reaches])
+            whole = self.camera.frame(all_ways, self.stage.aspect)
+            if whole.distance <= LONG * camera.distance:
+                camera, self._follows = whole, False
+                ways = np.array([reach.way for reach in reaches])
+        homes = np.array([character.pool[:2] - character.spot for character in self._characters])
+        self._marks = homes[:, None] + ways
+        self._boxes, self.camera = boxes, camera
+
+    def _with_rest(self, boxes: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
+        """Boxes (A, 2, 3) [m] of the puppets on the stage, each with its rest pose."""
+        places = np.array([character.position for character in self._characters])[:, None]
+        low, high = np.moveaxis(np.array(boxes) + places, 1, 0)
+        rest_low, rest_high = np.moveaxis(self._rest, 1, 0)
+        return np.stack([np.minimum(low, rest_low), np.maximum(high, rest_high)], axis=1)
+
+    def follow(self, time: float) -> None:
+        """Let camera and spot lights glide on after the puppets, to the show's time [s]."""
+        self._glide.follow(np.array([puppet.travelled for puppet in self._puppets]), time)
+
+    def snapshot(self) -> GlideState:
+        """Return what is remembered between frames."""
+        return self._glide.snapshot()
+
+    def restore(self, state: GlideState) -> None:
+        """Go back to a snapshot of a scene with as many puppets."""
+        self._glide.restore(state)
 
     def show(self, pose: Pose | None, motions: Sequence[Motion]) -> None:
         """Draw the puppets as they are now, and the performer in the inset."""
@@ -120,11 +155,31 @@ class Scene:
             colours = _joint_colours(len(pose.seen), highlights[0])
             self._inset.update(pose.seen, colours=colours, dimmed=pose.filled)
         self.stage.brightness = 1.0 - self.blackout.level
-        self.stage.draw(self.camera, self._inset if pose is not None else None)
+        for character, spot in zip(self._characters, self._glide.places, strict=True):
+            character.spot = spot
+        inset = self._inset if pose is not None else None
+        self.stage.draw(self._gliding_camera(), inset, self._stage_set())
 
     def picture(self) -> NDArray[np.uint8]:
         """Return the newest picture (H, W, 4): sRGB with straight alpha, top row first."""
         return self.stage.read()
+
+    def _gliding_camera(self) -> Camera:
+        """The camera where it has glided to: as far on, and back, as framing all takes it."""
+        if not self._follows or not self._glide.places.any():
+            return self.camera
+        now = self._boxes.copy()
+        now[:, :, ::2] += self._glide.places[:, None]
+        home, there = (self.camera.frame(each, self.stage.aspect) for each in (self._boxes, now))
+        shift = np.subtract(there.target, home.target)
+        return self.camera.moved(shift, there.distance / home.distance)
+
+    def _stage_set(self) -> StageSet:
+        """The curtain: it stays round all that is framed, and glides with the camera."""
+        if not self._follows:
+            return stage_set(self._marks.reshape(-1, 2))
+        slide = float(self._glide.places[:, 0].mean())
+        return stage_set(self._marks[:, 0] + self._glide.places, slide)
 
     def close(self) -> None:
         """Free the stage."""

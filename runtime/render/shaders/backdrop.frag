@@ -62,7 +62,7 @@ float beams(vec3 from, vec3 along, float until) {
 }
 
 vec3 curtain(vec3 at) {
-    float around = atan(at.x - stage.x, -(at.z - stage.y)) * stage.z;
+    float around = atan(at.x - stage.x, -(at.z - stage.y)) * stage.z + picture.w;
     around += 0.03 * sin(at.y * 1.3 + around * 2.0);
     float stripe = fract(around / 1.8 + 0.5) * 3.0;
     float folds = sin(around * 17.0 + 1.3 * sin(around * 2.3)) * 0.5 + 0.5;

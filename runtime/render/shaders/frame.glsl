@@ -7,6 +7,6 @@ layout(std140) uniform Frame {
     vec4 key;            // direction towards the key light; w: 1 if there is a floor
     vec4 floor_area;     // least x, least z, 1 / width, 1 / depth of the floor mask
     vec4 stage;          // centre x, centre z, radius of the curtain, number of pools
-    vec4 picture;        // width and height [px], pixels per metre at distance 1
+    vec4 picture;        // width and height [px], pixels per metre at distance 1, slide of the cloth [m]
     vec4 pools[16];      // x, z, radius of each pool of light
 };
