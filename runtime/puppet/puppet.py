@@ -88,7 +88,7 @@ class Puppet:
         self.travel = Travel()
         self._targets = skeleton.at_rest
         self._standing = [np.empty_like(character.vertices) for _ in range(2)]
-        self._root = skeleton.tree.positions[skeleton.root]
+        self._root: Array = skeleton.tree.positions[skeleton.root]
         self._stance = Stance(0.0, self._root, np.zeros(3))
 
     def drive_with(self, driver: Driver) -> None:
