@@ -139,7 +139,7 @@ def test_rigid_weights_are_spread_where_the_surface_goes_on() -> None:
 
 
 def test_rigid_parts_that_are_apart_stay_rigid() -> None:
-    both = np.concatenate([VERTICES, VERTICES + [9.0, 0.0, 0.0]])
+    both = np.concatenate([VERTICES, VERTICES + np.array([9.0, 0.0, 0.0])])
     owner = np.repeat([0, 2], len(VERTICES))
     faces = np.concatenate([FACES, FACES + len(VERTICES)])
     weights = dense(skin_of_rigid_weights(both, faces, one_node(owner, 3)), 3)
