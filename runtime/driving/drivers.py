@@ -7,7 +7,7 @@ from contextlib import suppress
 
 from devices.errors import InputError
 from runtime.characters.sheet import is_sheet
-from runtime.driving.body.body_driver import BodyDriver
+from runtime.driving.body.body_driver import AbsoluteBodyDriver, BodyDriver
 from runtime.driving.driver import Driver
 from runtime.driving.pairing import Pairing
 from runtime.driving.polyline_driver import PolylineDriver, SkinnedPolylineDriver
@@ -41,6 +41,6 @@ def matched_driver(pairing: Pairing) -> Driver:
 DRIVERS: Mapping[str, DriverFactory] = {
     "auto": best_driver,
     "relative": PolylineDriver,
-    "absolute": BodyDriver,
+    "absolute": AbsoluteBodyDriver,
 }
 """Every driver by its name. A new driver is one more line here."""

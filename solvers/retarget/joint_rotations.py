@@ -1,8 +1,9 @@
 """Relates the rotations that a stream gives for its joints to a body at rest.
 
 "Joint to world" is the identity at rest in one file and a quarter turn in the next. One constant
-turn between joint and rest is fitted from the bones of one frame; where no such turn explains them,
-the rotations mean something else and only directions can be used.
+turn between joint and rest is fitted from the bones of one frame. Where no such turn explains them,
+but the frame is the rest pose itself, each joint's turn is what it has there. Else the rotations
+mean something else and only directions can be used.
 """
 
 from __future__ import annotations
@@ -13,11 +14,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from solvers.skeleton.quaternions import conjugate, rotate
+from solvers.skeleton.quaternions import conjugate, multiply, rotate
 
 Array = NDArray[np.float64]
 
 MOST_RESIDUAL = np.radians(12.0)  # between where a bone is and where its joint says
+_SAME = 2.0  # [deg] between the bones of a frame and those at rest, if it is the rest pose
 _FEWEST = 3  # bones that a fit needs
 
 
@@ -26,11 +28,11 @@ class RestTurn:
     """What turns each joint from rest to its rotation.
 
     Attributes:
-        turn: (4,) from rest to the axes of every joint.
+        turns: (J, 4) from rest to the axes of each joint.
         is_usable: (J,) whether the joint's rotation explains the bones that begin at it.
     """
 
-    turn: Array
+    turns: Array
     is_usable: NDArray[np.bool_]
 
 
@@ -67,7 +69,26 @@ def fit_rest_turn(
         residual = np.arccos(np.clip(cosine, -1.0, 1.0))
         weights = 1.0 / (1.0 + (residual / MOST_RESIDUAL) ** 2)
     if float(np.median(residual)) > MOST_RESIDUAL:
-        return None
+        return _fit_rest_itself(rotations, bones, moved[real] / now[real, None])
     worst = np.zeros(len(parents))
     np.maximum.at(worst, near, residual)
-    return RestTurn(turn.as_quat(), worst <= MOST_RESIDUAL)
+    usable: NDArray[np.bool_] = worst <= MOST_RESIDUAL
+    return RestTurn(np.tile(turn.as_quat(), (len(parents), 1)), usable)
+
+
+def _fit_rest_itself(rotations: Array, bones: Array, now: Array) -> RestTurn | None:
+    """The turns of joints in a frame that is the rest pose, turned as a whole; else None.
+
+    Args:
+        rotations: (J, 4) of the frame.
+        bones: (B, 3) unit directions at rest.
+        now: (B, 3) unit directions in the frame.
+    """
+    whole, _ = Rotation.align_vectors(now, bones)
+    cosine = np.einsum("ij,ij->i", whole.apply(bones), now)
+    if float(np.degrees(np.arccos(np.clip(cosine, -1.0, 1.0))).max()) > _SAME:
+        return None
+    known = np.isfinite(rotations.sum(axis=1))
+    turns = np.tile([0.0, 0.0, 0.0, 1.0], (len(rotations), 1))
+    turns[known] = multiply(conjugate(rotations[known]), whole.as_quat())
+    return RestTurn(turns, known)

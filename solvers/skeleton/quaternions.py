@@ -35,6 +35,18 @@ def conjugate(quaternions: Array) -> Array:
     return inverse
 
 
+def between(a: Array, b: Array) -> Array:
+    """Return the smallest rotations (..., 4) from unit vectors a to b (..., 3)."""
+    turn = np.concatenate([_cross(a, b), 1.0 + (a * b).sum(axis=-1, keepdims=True)], axis=-1)
+    norm = np.linalg.norm(turn, axis=-1, keepdims=True)
+    # Opposite vectors have no smallest rotation: half a turn about any axis across them.
+    aside = np.where(np.abs(a[..., :1]) < 0.9, np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
+    half = np.concatenate([_cross(a, aside), np.zeros_like(norm)], axis=-1)
+    half = half / np.linalg.norm(half, axis=-1, keepdims=True)
+    smallest: Array = np.where(norm > 1e-9, turn / np.maximum(norm, 1e-9), half)
+    return smallest
+
+
 def _cross(a: Array, b: Array) -> Array:
     """Cross products (..., 3); np.cross takes five times as long for a few vectors."""
     out = np.empty(np.broadcast_shapes(a.shape, b.shape))

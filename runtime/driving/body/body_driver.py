@@ -17,6 +17,7 @@ from runtime.driving.body.footing import Footing, FootingState
 from runtime.driving.body.joint_turns import JointTurns
 from runtime.driving.body.long_arms import LongArms
 from runtime.driving.body.path import Path
+from runtime.driving.body.upright import upright_at_rest, upright_in_poses
 from runtime.driving.driver import DrivenPart, Highlight, Needs
 from runtime.driving.pairing import Pairing
 from runtime.driving.part_names import part_name
@@ -26,12 +27,12 @@ from runtime.driving.targets import PosedNodes, Targets
 from solvers.retarget.heading import turned
 from solvers.retarget.joint_rotations import RestTurn
 from solvers.retarget.limb_posing import pose_limbs
-from solvers.retarget.trunk_turns import UPRIGHT, orientations, trunk_turns
-from solvers.skeleton.quaternions import multiply, rotate
+from solvers.retarget.trunk_turns import UPRIGHT, trunk_turns
+from solvers.skeleton.quaternions import between, multiply, rotate
 
 Array = NDArray[np.float64]
 
-_STANDING = np.cos(np.radians(25.0))  # of the trunk of a rest pose that is upright
+_MEASURED = 64  # poses of a clip in which the upright body is measured
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -41,6 +42,7 @@ class BodyState:
     Attributes:
         rest: the performer's rest state; None while nothing drives.
         origin: (2,) [m] where the performer's hips were when the character began to travel.
+        upright: (3, 4) the orientations of the performer's trunk while standing upright.
         trunk: (3, 4) the last turns of pelvis, chest and head.
         twists: (S,) [rad] of the forearms.
         nodes: the posed nodes.
@@ -50,6 +52,7 @@ class BodyState:
 
     rest: Rest | None
     origin: Array
+    upright: Array
     trunk: Array
     twists: Array
     nodes: PosedNodes
@@ -60,8 +63,14 @@ class BodyState:
 class BodyDriver:
     """Moves the parts of a body as the same parts of the performer move.
 
+    Legs and forelegs that bend at rest, as an animal's do, turn from there as the performer's turn
+    from standing; all other limbs point where the performer's point.
+
     Args:
         pairing: the performer and the character.
+
+    Attributes:
+        least_upright: cosine of the angle to the vertical beyond which a leg counts as bent.
 
     Raises:
         InputError: performer and character have no part in common.
@@ -69,6 +78,7 @@ class BodyDriver:
 
     needs = Needs()
     poses_nodes = True
+    least_upright = float(np.cos(np.radians(35.0)))
 
     def __init__(self, pairing: Pairing) -> None:
         performer, character, skeleton = pairing.performer, pairing.character, pairing.skeleton
@@ -87,13 +97,15 @@ class BodyDriver:
             plan,
             source,
             self._facing,
+            self.least_upright,
         )
         if parts is None:
             raise InputError(f"{character.name} has no part that the performer has too")
         self._parts: BodyParts = parts
         self._skeleton = skeleton
         self._character = character
-        self._upright = self._neutral(upright)
+        self._at_rest_upright = upright_at_rest(upright, self._facing, parts.trunk)
+        self._upright = self._at_rest_upright
         self._joint_turns = JointTurns(
             performer, (*parts.hands, parts.skull), heading_at_rest, self._facing
         )
@@ -115,21 +127,6 @@ class BodyDriver:
         self._twists = np.zeros(len(parts.rig.near))
         self._nodes = skeleton.rest_nodes
         self._at_rest = Targets(skeleton.skinned(self._nodes), nodes=self._nodes)
-        skeleton.skinned(self._nodes)  # finds the skin now, so that no frame waits for it
-
-    def _neutral(self, upright: Array) -> Array:
-        """The orientations (3, 4) of the performer's trunk while it stands upright."""
-        joints = self._parts.trunk
-        own = orientations(upright, joints)
-        ideal = np.tile([0.0, np.sin(0.5 * self._facing), 0.0, np.cos(0.5 * self._facing)], (3, 1))
-        head = own[2].copy()
-        for part in range(3):
-            x, _, z, _ = own[part]
-            if part < 2 and 1.0 - 2.0 * (x * x + z * z) < _STANDING:
-                own[part] = ideal[part]
-        if joints.face[2] < 0 and joints.head >= 0 and head[1] < _STANDING:
-            own[2] = (0.0, 1.0, 0.0, 0.0)
-        return own
 
     def _size_ratio(self, upright: Array) -> float:
         """How long the character's legs are for each metre of the performer's."""
@@ -147,6 +144,15 @@ class BodyDriver:
         self._rest = rest
         self._origin = clip[0].hips[[0, 2]] if clip else None
         self.reset()
+        self._upright = self._at_rest_upright
+        known = bool(clip) and self._joint_turns.learn(clip[0])
+        if rest is not None and not known:
+            step = max(len(clip) // _MEASURED, 1)
+            shown = [pose.facing(self._facing) for pose in clip[::step]]
+            own = turned(rest.positions, self._facing - rest.heading, np.zeros(3))
+            self._upright = upright_in_poses(
+                self._at_rest_upright, self._parts.trunk, shown or [own]
+            )
 
     def targets(self, pose: Pose) -> Targets:
         """Return the targets for a pose; those of the rest pose while nothing drives."""
@@ -158,7 +164,7 @@ class BodyDriver:
         self._trunk = trunk_turns(joints, self._parts.trunk, self._upright, self._trunk)
         rotations, positions = np.empty((len(rig.order), 4)), np.empty((len(rig.order), 3))
         own = self._joint_turns.turns(pose, heading)
-        given = self._given(own[:-1])
+        given = self._given(own[:-1], joints)
         if own[-1].any():
             self._trunk[2] = own[-1]
         self._footing.watch(pose)
@@ -183,11 +189,20 @@ class BodyDriver:
         placement = path.placement(self._ratio * self._footing.clearance(pose))
         return Targets(shape, placement, self._nodes)
 
-    def _given(self, hands: Array) -> Array:
-        """The rotations (S, 4) of segments that the performer's rotations (S, 4) decide."""
-        known = hands.any(axis=1) & (self._parts.rig.across[:, 0] < 0)
+    def _given(self, hands: Array, joints: Array) -> Array:
+        """The rotations (S, 4) of the hands, as the performer's rotations (S, 4) turn them.
+
+        They point where the joints say, and the rotations decide how they are rolled.
+        """
+        rig = self._parts.rig
         given = np.zeros_like(hands)
-        given[known] = multiply(hands[known], self._parts.hand_change[known])
+        for hand in np.flatnonzero(hands.any(axis=1) & (rig.across[:, 0] < 0)):
+            turn = multiply(hands[hand], self._parts.hand_change[hand])
+            way = joints[rig.far[hand]] - joints[rig.near[hand]]
+            length = float(np.linalg.norm(way))
+            if length > 0.0:
+                turn = multiply(between(rotate(turn, rig.along[hand]), way / length), turn)
+            given[hand] = turn
         return given
 
     def _path(self, pose: Pose, rest: Rest, heading: float) -> Path:
@@ -240,6 +255,7 @@ class BodyDriver:
         return BodyState(
             self._rest,
             origin,
+            self._upright,
             self._trunk,
             self._twists.copy(),
             self._nodes,
@@ -251,6 +267,12 @@ class BodyDriver:
         """Go back to a snapshot."""
         self._rest, self._trunk, self._nodes = state.rest, state.trunk, state.nodes
         self._origin = None if np.isnan(state.origin).any() else state.origin
-        self._twists = state.twists.copy()
+        self._twists, self._upright = state.twists.copy(), state.upright
         self._joint_turns.restore(state.rest_turn)
         self._footing.restore(state.footing)
+
+
+class AbsoluteBodyDriver(BodyDriver):
+    """A `BodyDriver` whose limbs all point where the performer's point, bent at rest or not."""
+
+    least_upright = -np.inf

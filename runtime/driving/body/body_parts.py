@@ -12,18 +12,14 @@ from devices.bodies.body_plan import SIDES, BodyPlan, Chain, Limb
 from devices.bodies.joint_labels import label_joints
 from devices.bodies.joint_names import Kind, Side
 from devices.skeleton import Skeleton
+from runtime.driving.body.rig_builder import RigBuilder
 from runtime.driving.driver import ABSOLUTE, RELATIVE
-from solvers.retarget.limb_posing import BLENDS, RIDES, LimbRig, hand_frame
+from solvers.retarget.limb_posing import LimbRig
 from solvers.retarget.trunk_turns import TrunkJoints
-from solvers.skeleton.quaternions import conjugate, multiply
 from solvers.skeleton.tree import Tree
 
 Array = NDArray[np.float64]
 
-_UPRIGHT = np.cos(np.radians(35.0))  # of a leg against the vertical; one that leans more is none
-_DOWN = np.array([0.0, -1.0, 0.0])
-_LOW = 0.15  # of the height: a limb that ends lower stands on the floor
-_BESIDE = 0.35  # of the forearm: bones that begin this near to the wrist are parts of the hand
 _WAIST = (0.2, 0.8)  # shares of the trunk between which a joint shows the waist
 
 
@@ -108,6 +104,7 @@ def body_parts(
     plan: BodyPlan,
     source: BodyPlan,
     facing: float,
+    least_upright: float,
 ) -> BodyParts | None:
     """Return the parts that both bodies have; None where no limb and no head corresponds.
 
@@ -119,8 +116,9 @@ def body_parts(
         plan: the character's body.
         source: the performer's body.
         facing: [rad] the heading of both.
+        least_upright: as of `RigBuilder.drive_of`.
     """
-    rig = _Rig(tree, upright, facing)
+    rig = RigBuilder(tree, upright, facing)
     parts: list[Part] = []
     legs: list[Leg] = []
     arms: list[Arm] = []
@@ -128,7 +126,8 @@ def body_parts(
     for side in SIDES:
         theirs, ours = source.legs.get(side), plan.legs.get(side)
         if theirs and ours and chosen.issuperset(theirs.upper):
-            drive, segments = rig.add_leg(theirs, ours)
+            drive = rig.drive_of(plan.legs.values(), least_upright)
+            segments = rig.add_leg(theirs, ours, drive)
             parts.append(Part(f"{side} leg", _joined(theirs), _joined(ours), drive))
             if theirs.lower and ours.lower:
                 legs.append(Leg(_bends(theirs), _bends(ours), segments))
@@ -136,7 +135,9 @@ def body_parts(
         theirs, ours = source.arms.get(side), plan.arms.get(side)
         if theirs and ours and chosen.issuperset(theirs.upper):
             first = rig.segments
-            drive = rig.add_arm(theirs, ours, _knuckles(source, side), _knuckles(plan, side))
+            drive = rig.drive_of(plan.arms.values(), least_upright)
+            palms = _knuckles(source, side), _knuckles(plan, side)
+            rig.add_arm(theirs, ours, *palms, drive)
             parts.append(Part(f"{side} arm", _joined(theirs), _joined(ours), drive))
             if drive == ABSOLUTE:
                 numbers = tuple(range(first, rig.segments))
@@ -157,175 +158,11 @@ def body_parts(
         rig.finished(),
         _trunk_joints(performer, source, chosen),
         np.array(rig.hands, dtype=np.int64),
-        np.array(rig.hand_change),
+        np.array(rig.hand_change).reshape(-1, 4),
         skull,
         tuple(legs),
         tuple(arms),
     )
-
-
-class _Rig:
-    """Collects the segments of a `LimbRig`."""
-
-    def __init__(self, tree: Tree, upright: Array, facing: float) -> None:
-        self._tree, self._rest, self._upright = tree, tree.positions, upright
-        self._front = np.array([np.sin(facing), 0.0, np.cos(facing)])
-        self._role = np.full(len(tree), RIDES)
-        self._share = np.zeros(len(tree))
-        self._near: list[int] = []
-        self._far: list[int] = []
-        self._across: list[tuple[int, int]] = []
-        self._along: list[Array] = []
-        self._frame: list[Array] = []
-        self._is_free: list[bool] = []
-        self._twisted_by: list[int] = []
-        self.hands: list[int] = []
-        self.hand_change: list[Array] = []
-
-    @property
-    def segments(self) -> int:
-        """How many segments there are."""
-        return len(self._near)
-
-    def add_leg(self, theirs: Limb, ours: Limb) -> tuple[str, tuple[int, int, int]]:
-        """Let a leg follow a leg; return how it is driven, and its segments as of `Leg`."""
-        drive = ABSOLUTE
-        if any(_leans(self._rest, chain) for chain in (ours.upper, ours.lower) if chain):
-            drive = RELATIVE
-        last, foot = self._follow(theirs, ours, drive, self._upright), -1
-        if ours.end:
-            ends = theirs.end or (theirs.lower or theirs.upper)[-1:]
-            foot = self._add(ours.end, ends[0], ends[-1])
-            self._is_free[foot] = True
-            self._along[foot] = _direction(self._upright, ends)
-        return drive, (last - 1, last, foot)
-
-    def add_arm(
-        self,
-        theirs: Limb,
-        ours: Limb,
-        source_knuckles: tuple[int, int] | None,
-        target_knuckles: tuple[int, int] | None,
-    ) -> str:
-        """Let an arm follow an arm, its hand a hand; return how it is driven."""
-        drive = ABSOLUTE
-        neutral: Array | None = self._upright
-        low = self._rest[:, 1].min() + _LOW * np.ptp(self._rest[:, 1])
-        segments = (ours.upper, ours.lower)
-        if self._rest[ours.segments[-1][-1], 1] < low and any(
-            _leans(self._rest, chain) for chain in segments if chain
-        ):
-            drive, neutral = RELATIVE, None
-        last = self._follow(theirs, ours, drive, neutral)
-        if not (ours.end and theirs.end):
-            return drive
-        hand = self._add(ours.end, theirs.end[0], theirs.end[-1])
-        frame = self._hand_at_rest(self._rest, ours.end, target_knuckles)
-        if source_knuckles:
-            self._across[hand], self._frame[hand] = source_knuckles, frame
-        else:
-            self.hands[hand] = theirs.end[0]
-            theirs_at_rest = self._hand_at_rest(self._upright, theirs.end, None)
-            self.hand_change[hand] = multiply(theirs_at_rest, conjugate(frame))
-        if ours.lower:
-            self._twisted_by[last] = hand
-            self._take_beside(ours, hand)
-        return drive
-
-    def _hand_at_rest(self, points: Array, hand: Chain, knuckles: tuple[int, int] | None) -> Array:
-        """The orientation (4,) of a hand at rest; without knuckles its palm looks down or inward.
-
-        The index finger is then in front, as in a T pose and beside the thighs alike.
-        """
-        if knuckles is not None:
-            return hand_frame(points, hand[0], hand[-1], knuckles)
-        behind = points[hand[0]] - self._front
-        three = np.array([points[hand[0]], points[hand[-1]], behind])
-        return hand_frame(three, 0, 1, (0, 2))
-
-    def add_fingers(self, source: BodyPlan, plan: BodyPlan, side: Side) -> None:
-        """Let each finger follow the finger of the same name, bone for bone."""
-        for key, ours in plan.fingers.items():
-            theirs = source.fingers.get(key)
-            if key[0] is not side or theirs is None:
-                continue
-            bones = min(len(ours), len(theirs)) - 1
-            for bone in range(bones):
-                last = len(theirs) - 1 if bone == bones - 1 else bone + 1
-                self._add(ours[bone : bone + 2], theirs[bone], theirs[last])
-
-    def blend_trunk(self, plan: BodyPlan, has_head: bool) -> None:
-        """Bend the trunk between pelvis and chest, and the neck between chest and head."""
-        self._blend(plan.trunk, 0.0)
-        if len(plan.trunk) == 1:
-            self._share[plan.hips] = 0.5
-        if has_head and plan.skull is not None:
-            neck = plan.head[: plan.head.index(plan.skull) + 1]
-            self._blend(neck, 1.0, skip=1 if len(plan.trunk) > 1 or len(neck) > 1 else 0)
-            for node in plan.head[len(neck) :]:
-                self._role[node] = RIDES
-
-    def finished(self) -> LimbRig:
-        """The rig."""
-        return LimbRig(
-            order=np.array(self._tree.order, dtype=np.int64),
-            parents=self._tree.parents,
-            rest=self._rest,
-            role=self._role.astype(np.int64),
-            share=self._share,
-            near=np.array(self._near, dtype=np.int64),
-            far=np.array(self._far, dtype=np.int64),
-            across=np.array(self._across, dtype=np.int64).reshape(-1, 2),
-            along=np.array(self._along).reshape(-1, 3),
-            frame=np.array(self._frame).reshape(-1, 4),
-            is_free=np.array(self._is_free, dtype=np.bool_),
-            twisted_by=np.array(self._twisted_by, dtype=np.int64),
-        )
-
-    def _follow(self, theirs: Limb, ours: Limb, drive: str, neutral: Array | None) -> int:
-        """Let upper and lower segment follow; return the number of the last one."""
-        pairs = [(ours.upper, theirs.upper)]
-        if not ours.lower and theirs.lower:
-            pairs = [(ours.upper, theirs.upper + theirs.lower)]
-        elif ours.lower:
-            pairs.append((ours.lower, theirs.lower or theirs.upper))
-        for mine, source in pairs:
-            last = self._add(mine, source[0], source[-1])
-            if drive == RELATIVE:
-                self._along[last] = _DOWN if neutral is None else _direction(neutral, source)
-        return last
-
-    def _add(self, nodes: Chain, near: int, far: int) -> int:
-        """Let the bones of a segment follow the line between two joints; return its number."""
-        number = len(self._near)
-        free = [node for node in nodes[:-1] if self._role[node] == RIDES]
-        self._role[free] = number
-        self._near.append(near)
-        self._far.append(far)
-        self._across.append((-1, -1))
-        self._along.append(_direction(self._rest, nodes))
-        self._frame.append(np.zeros(4))
-        self._is_free.append(False)
-        self._twisted_by.append(-1)
-        self.hands.append(-1)
-        self.hand_change.append(np.zeros(4))
-        return number
-
-    def _take_beside(self, ours: Limb, hand: int) -> None:
-        """Let all bones turn with the hand that begin beside its wrist on the forearm."""
-        wrist = ours.end[0]
-        reach = _BESIDE * float(np.linalg.norm(self._rest[wrist] - self._rest[ours.lower[0]]))
-        for node in self._tree.children[int(self._tree.parents[wrist])]:
-            near = float(np.linalg.norm(self._rest[node] - self._rest[wrist])) < reach
-            if near and node not in ours.lower and self._role[node] == RIDES:
-                self._role[node] = hand
-
-    def _blend(self, chain: Chain, start: float, skip: int = 0) -> None:
-        lengths = np.linalg.norm(np.diff(self._rest[list(chain)], axis=0), axis=1)
-        along = np.append(0.0, lengths.cumsum())
-        shares = along / along[-1] if along[-1] > 0.0 else np.linspace(0.0, 1.0, len(chain))
-        for node, share in list(zip(chain, shares, strict=True))[skip:]:
-            self._role[node], self._share[node] = BLENDS, start + share
 
 
 def _trunk_joints(performer: Skeleton, source: BodyPlan, chosen: frozenset[int]) -> TrunkJoints:
@@ -396,14 +233,3 @@ def _bends(limb: Limb) -> tuple[int, int, int, int]:
     """Hip, knee, ankle and toes; without toes the ankle twice."""
     ankle = limb.lower[-1]
     return limb.upper[0], limb.lower[0], ankle, limb.end[-1] if limb.end else ankle
-
-
-def _direction(points: Array, chain: Chain) -> Array:
-    """The unit vector (3,) from the first to the last of some points; down without length."""
-    gap = points[chain[-1]] - points[chain[0]]
-    length = float(np.linalg.norm(gap))
-    return gap / length if length > 0.0 else _DOWN
-
-
-def _leans(points: Array, chain: Chain) -> bool:
-    return bool(_direction(points, chain) @ _DOWN < _UPRIGHT)

@@ -45,18 +45,29 @@ class JointTurns:
         if pose.rotations is None or not len(self._joints):
             return turns
         if self._fitted is None:
-            rest = self._performer.rest_positions
-            self._fitted = fit_rest_turn(self._performer.parents, rest, pose.seen, pose.rotations)
-            if self._fitted is None:
-                nothing = np.zeros(len(rest), dtype=np.bool_)
-                self._fitted = RestTurn(np.array([0.0, 0.0, 0.0, 1.0]), nothing)
+            self._fitted = self._fit(pose, pose.rotations)
         own = pose.rotations[self._joints]
         known = (self._joints >= 0) & self._fitted.is_usable[self._joints]
         known &= np.isfinite(own).all(axis=1)
         whole = about_vertical(self._facing - heading)
-        turned = multiply(whole, multiply(own, multiply(self._fitted.turn, self._from_rest)))
+        turned = multiply(
+            whole, multiply(own, multiply(self._fitted.turns[self._joints], self._from_rest))
+        )
         turns[known] = turned[known]
         return turns
+
+    def learn(self, pose: Pose) -> bool:
+        """Find out from a pose what the rotations mean; return whether they can be used."""
+        if pose.rotations is None:
+            return False
+        self._fitted = self._fit(pose, pose.rotations)
+        return bool(self._fitted.is_usable.any())
+
+    def _fit(self, pose: Pose, rotations: Array) -> RestTurn:
+        rest, parents = self._performer.rest_positions, self._performer.parents
+        nothing = np.zeros(len(rest), dtype=np.bool_)
+        unknown = RestTurn(np.tile([0.0, 0.0, 0.0, 1.0], (len(rest), 1)), nothing)
+        return fit_rest_turn(parents, rest, pose.seen, rotations) or unknown
 
     def snapshot(self) -> RestTurn | None:
         """Return what was fitted."""
