@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-SLACK = 0.12  # [m] that a character may go to and fro without being followed
-BRISK = 3.0  # [1/s] of the spring while it is hardly behind
-STIFFER = 0.2  # [m] behind at which it is twice as stiff
+SLACK = 0.1  # [m] that a character may go to and fro without being followed
+BRISK = 4.0  # [1/s] of the spring while it is hardly behind
+STIFFER = 0.05  # [m] behind at which it is twice as stiff
 FASTEST = 5.0  # [m/s]
 JUMP = 1.5  # [m] in one frame: a character that was put elsewhere, as at the end of a loop
 LONGEST_STEP = 0.1  # [s] that a frame counts for at most

@@ -6,26 +6,59 @@ import moderngl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from devices.bodies.joint_labels import label_joints
+from devices.bodies.joint_names import Kind
+from devices.skeleton import Skeleton
 from runtime.render.programs import link, release_all
 from runtime.render.tubes import TubePainter, Tubes, tubes
 
 IDLE = np.array([0.62, 0.60, 0.56])  # linear RGB of a joint that drives nothing
 SHRINK = 0.01  # share of the spare size that the view gives up at each update
-FILL = 0.74  # share of the inset's radius that the performer fills
+FILL = 0.88  # share of the inset's radius that the performer fills when stretched out
+STRETCHED = 0.9  # of the longest way along bones: no body stretches all of it along one line
+ROUND = 0.9  # of the circle round the performer is inside, where that is larger
+NO_BONE = (Kind.ROOT, Kind.HELPER)
+
+
+def body_bones(skeleton: Skeleton) -> tuple[NDArray[np.int64], NDArray[np.bool]]:
+    """Return the bones of a body without what rigs add: a root on the floor, and helpers.
+
+    Returns:
+        (J,) int parents among the joints that are left, -1 where there is none; and (J,) bool,
+        whether a joint is left.
+    """
+    parts = label_joints(skeleton)
+    shown = np.array([part is None or part.kind not in NO_BONE for part in parts])
+    if not shown.any():
+        return skeleton.parents.astype(np.int64), np.ones(len(parts), dtype=np.bool)
+    parents = np.full(len(parts), -1, dtype=np.int64)
+    for joint in skeleton.order:
+        above = int(skeleton.parents[joint])
+        if above >= 0:
+            parents[joint] = above if shown[above] else parents[above]
+    return parents, shown
 
 
 class SkeletonInset:
     """A performer's skeleton, scaled and centred so that it fits the inset without jitter.
 
-    The view moves only when the performer would leave it, grows at once and shrinks slowly. It
+    The view is as large as the performer is with all limbs stretched out, so that no pose changes
+    it. It moves only when the performer would leave it, grows at once and shrinks slowly. It
     advances once an update, not with a clock, so replays draw the same pictures.
 
+    Args:
+        parents: (J,) int, -1 at each root.
+        shown: (J,) bool, the joints that are drawn; all if None. None hangs on another one.
+
     Attributes:
-        parents: (J,) int, -1 at the root.
+        parents: see above.
     """
 
-    def __init__(self, parents: ArrayLike) -> None:
+    def __init__(self, parents: ArrayLike, shown: ArrayLike | None = None) -> None:
         self.parents = np.asarray(parents, dtype=np.int64)
+        every = np.ones(len(self.parents), dtype=np.bool)
+        self._shown = every if shown is None else np.asarray(shown, dtype=np.bool)
+        self._upward = _leaves_first(self.parents)
         self._centre: NDArray[np.float64] | None = None
         self._half = 0.0
         self._capsules: Tubes = np.empty((0, 13), dtype=np.float32)
@@ -47,21 +80,35 @@ class SkeletonInset:
             view_rotation: (3, 3) world to the viewer's axes; None for the front view.
         """
         seen = positions if view_rotation is None else positions @ view_rotation.T
-        known = np.asarray(np.isfinite(seen).all(axis=1), dtype=np.bool)
+        known = np.asarray(np.isfinite(seen).all(axis=1), dtype=np.bool) & self._shown
         if not known.any():
             self._capsules = np.empty((0, 13), dtype=np.float32)
             return
-        centre = self._follow(seen[known])
+        centre = self._follow(seen[known], self._longest(seen, known))
         count = len(self.parents)
         painted = np.full((count, 3), np.nan) if colours is None else colours
         faint: NDArray[np.bool] = np.zeros(count, dtype=np.bool) if dimmed is None else dimmed
         placed = (seen - [*centre, 0.0]) / self._half
         self._capsules = _skeleton_tubes(placed, self.parents, painted, faint, known)
 
-    def _follow(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _longest(self, seen: NDArray[np.float64], known: NDArray[np.bool]) -> float:
+        """The length [m] of the longest way along bones: no pose makes the performer longer."""
+        bones = np.linalg.norm(seen - seen[self.parents], axis=1)
+        bones[~(known & known[self.parents])] = 0.0
+        below, longest, lengths = [0.0] * len(bones), 0.0, bones.tolist()
+        for joint, parent in self._upward:
+            reach = below[joint] + lengths[joint]
+            longest = max(longest, reach + below[parent])
+            below[parent] = max(below[parent], reach)
+        return longest
+
+    def _follow(self, points: NDArray[np.float64], longest: float) -> NDArray[np.float64]:
         low, high = points[:, :2].min(axis=0), points[:, :2].max(axis=0)
         middle = (low + high) / 2.0
-        reach = max(float(np.linalg.norm(points[:, :2] - middle, axis=1).max()), 1e-6)
+        circle = float(np.linalg.norm(points[:, :2] - middle, axis=1).max())
+        reach = max(
+            STRETCHED * longest / 2.0, float((high - low).max()) / 2.0, ROUND * circle, 1e-6
+        )
         if self._centre is None:
             self._centre, self._half = middle, reach
         self._half = max(reach, self._half - SHRINK * (self._half - reach))
@@ -75,6 +122,17 @@ class SkeletonInset:
     def capsules(self) -> Tubes:
         """(K, 13) capsules in the inset's coordinates: a unit circle, the viewer on +z."""
         return self._capsules
+
+
+def _leaves_first(parents: NDArray[np.int64]) -> list[tuple[int, int]]:
+    """Return each joint that has a parent, with it, before the parent."""
+    depths = np.zeros(len(parents), dtype=np.int64)
+    above = parents.copy()
+    while (above >= 0).any():
+        depths += above >= 0
+        above = np.where(above >= 0, parents[above], -1)
+    order = np.argsort(-depths, kind="stable").tolist()
+    return [(joint, int(parents[joint])) for joint in order if parents[joint] >= 0]
 
 
 def _skeleton_tubes(

@@ -9,18 +9,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from devices.bodies.rest_heading import rest_heading
 from devices.skeleton import Skeleton
 from runtime.characters.character import Character
 from runtime.control.ramp import Ramp
-from runtime.driving.driver import Highlight
+from runtime.driving.driver import Highlight, MappedDriver
 from runtime.driving.performer import Pose
 from runtime.driving.reach import Reach
 from runtime.puppet.puppet import Motion, Puppet
 from runtime.render.background import Background
 from runtime.render.camera import Camera, front_camera
 from runtime.render.frame import StageSet, stage_set
-from runtime.render.glide import Glide, GlideState
-from runtime.render.inset import SkeletonInset
+from runtime.render.glide import SLACK, Glide, GlideState
+from runtime.render.inset import SkeletonInset, body_bones
 from runtime.render.stage import Stage
 from runtime.render.tubes import PAIR_COLOURS
 
@@ -29,7 +30,8 @@ if TYPE_CHECKING:
 
 GAP = 0.18  # [m] of floor between two characters
 BLACKOUT = 0.3  # [s] to black, and back to light
-LONG = 1.6  # times further back to frame the whole way: a longer way is followed
+MARGIN = 0.06  # of the picture on each side that stays free
+LONG = 1.4  # times further back to frame the whole way: a longer way is followed
 ROOM = 0.12  # share of a character's size that stays in view around its rest pose
 
 
@@ -78,7 +80,7 @@ class Scene:
             for puppet, place in zip(puppets, places, strict=True)
         ]
         plain = plain or background is not None
-        self._inset = None if plain else SkeletonInset(performer.parents)
+        self._inset = None if plain else SkeletonInset(*body_bones(performer))
         self.highlights = not plain
         self.camera = front_camera()
         self._rest = self.stage.boxes
@@ -105,16 +107,22 @@ class Scene:
             boxes[:, 1] += room
         else:
             boxes = self._with_rest([reach.around for reach in reaches])
-        camera, self._follows = self.camera.frame(boxes, self.stage.aspect), True
+        camera, self._follows = self._framed(boxes), True
         if reaches is not None and not any(puppet.travel.in_place for puppet in self._puppets):
-            all_ways = self._with_rest([reach.path for reach in reaches])
-            whole = self.camera.frame(all_ways, self.stage.aspect)
+            whole = self._framed(self._with_rest([reach.path for reach in reaches]))
             if whole.distance <= LONG * camera.distance:
                 camera, self._follows = whole, False
                 ways = np.array([reach.way for reach in reaches])
+            else:
+                boxes[:, :, ::2] += [[-SLACK], [SLACK]]  # the camera stays behind a little
+                camera = self._framed(boxes)
         homes = np.array([character.pool[:2] - character.spot for character in self._characters])
         self._marks = homes[:, None] + ways
         self._boxes, self.camera = boxes, camera
+
+    def _framed(self, boxes: NDArray[np.float64]) -> Camera:
+        """The camera, moved so that boxes (A, 2, 3) [m] fill the picture."""
+        return self.camera.frame(boxes, self.stage.aspect, margin=MARGIN)
 
     def _with_rest(self, boxes: Sequence[NDArray[np.float64]]) -> NDArray[np.float64]:
         """Boxes (A, 2, 3) [m] of the puppets on the stage, each with its rest pose."""
@@ -153,7 +161,12 @@ class Scene:
             character.highlight([each.points for each in lit], _colours(len(lit)))
         if self._inset is not None and pose is not None:
             colours = _joint_colours(len(pose.seen), highlights[0])
-            self._inset.update(pose.seen, colours=colours, dimmed=pose.filled)
+            self._inset.update(
+                pose.seen,
+                colours=colours,
+                dimmed=pose.filled,
+                view_rotation=_side_of(self._puppets[0]),
+            )
         self.stage.brightness = 1.0 - self.blackout.level
         for character, spot in zip(self._characters, self._glide.places, strict=True):
             character.spot = spot
@@ -170,7 +183,7 @@ class Scene:
             return self.camera
         now = self._boxes.copy()
         now[:, :, ::2] += self._glide.places[:, None]
-        home, there = (self.camera.frame(each, self.stage.aspect) for each in (self._boxes, now))
+        home, there = self._framed(self._boxes), self._framed(now)
         shift = np.subtract(there.target, home.target)
         return self.camera.moved(shift, there.distance / home.distance)
 
@@ -197,6 +210,21 @@ def _side_by_side(characters: Sequence[Character]) -> list[float]:
     if len(characters) == 1:
         return [0.0]
     return [place - middle for place in places]
+
+
+def _side_of(puppet: Puppet) -> NDArray[np.float64] | None:
+    """The turn (3, 3) that shows a performer from the side from which the puppet is seen.
+
+    None for the front, from which chains are matched, too.
+    """
+    plan = puppet.character.plan
+    if plan is None or isinstance(puppet.driver, MappedDriver):
+        return None
+    quarters = round(rest_heading(puppet.character.skeleton, plan) / (np.pi / 2.0))
+    if quarters == 0:
+        return None
+    sine, cosine = np.sin(quarters * np.pi / 2.0), np.cos(quarters * np.pi / 2.0)
+    return np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
 
 
 def _colours(count: int) -> NDArray[np.float64]:

@@ -35,7 +35,7 @@ def test_swaying_moves_nothing() -> None:
     assert not glided(Glide(1), np.column_stack([sway, 0.0 * sway])).any()
 
 
-@pytest.mark.parametrize(("speed", "behind"), [(1.3, 0.5), (3.5, 0.9)])
+@pytest.mark.parametrize(("speed", "behind"), [(1.3, 0.3), (4.0, 0.45)])
 def test_who_walks_or_runs_is_never_left_behind(speed: float, behind: float) -> None:
     ways = straight(speed, 6.0)
     places = glided(Glide(1), ways)
@@ -48,7 +48,7 @@ def test_it_starts_and_stops_softly_and_does_not_run_past() -> None:
     ways = np.vstack([ways, np.repeat(ways[-1:], 200, axis=0)])
     places = glided(Glide(1), ways)
     assert places[:, 0].max() <= ways[-1, 0]
-    assert np.abs(np.diff(places[:, 0], 2)).max() * RATE**2 < 8.0, "[m/s2]"
+    assert np.abs(np.diff(places[:, 0], 2)).max() * RATE**2 < 12.0, "[m/s2]"
     assert ways[-1, 0] - places[-1, 0] == pytest.approx(SLACK, abs=0.03)
     np.testing.assert_array_equal(places[-1], places[-2])  # so that the backdrop can be kept
 

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
+from dataclasses import replace
 
 import moderngl
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
+from devices.bodies.plan_by_names import plan_by_names
 from devices.skeleton import Skeleton
 from runtime.driving.mapping import Mapping
 from runtime.driving.performer import Performer, Pose, rest_state
 from runtime.driving.reach import Reach
 from runtime.puppet.puppet import Motion, Puppet
 from runtime.render.background import NOTHING
-from runtime.render.camera import Camera, box_corners
 from runtime.show.scene import BLACKOUT, GAP, Scene
+from tests.runtime.show.framing import FULL, SIZE, WIDE, reach
 from tests.runtime.stick_figures import (
     ARMS,
     BODY,
@@ -28,23 +31,10 @@ from tests.runtime.stick_figures import (
     seen,
 )
 
-SIZE = (96, 54)
-WIDE = ((0.24, 0.72, -0.16), (1.6, 0.96, 0.16))
-
 
 @pytest.fixture(scope="module")
 def puppets() -> list[Puppet]:
     return [Puppet(make_figure(name="one")), Puppet(make_figure(WIDE, name="two"))]
-
-
-@pytest.fixture
-def scenes(context: moderngl.Context) -> Iterator[list[Scene]]:
-    """Where a test puts the scenes that it opens."""
-    opened: list[Scene] = []
-    yield opened
-    for scene in opened:
-        scene.close()
-    assert context.error == "GL_NO_ERROR"
 
 
 def rested(puppets: Sequence[Puppet]) -> list[Motion]:
@@ -55,15 +45,6 @@ def rested(puppets: Sequence[Puppet]) -> list[Motion]:
         puppet.surface.reset()
         driven_by(puppet, ARMS, rest_state(start))
     return [puppet.deform() for puppet in puppets]
-
-
-def reach(camera: Camera, boxes: np.ndarray, aspect: float) -> np.ndarray:
-    """How far from the middle (n, 2) the corners of boxes are in the picture, 1 at its edge."""
-    corners = box_corners(np.asarray(boxes))
-    points = np.column_stack([corners, np.ones(len(corners))])
-    clip = points @ (camera.projection(aspect) @ camera.view).T
-    assert (clip[:, 3] > 0.0).all(), "before the camera"
-    return np.abs(clip[:, :2] / clip[:, 3:])
 
 
 def test_those_on_stage_stand_side_by_side(
@@ -91,7 +72,7 @@ def test_the_camera_sees_everybody_with_room_to_move(
     scenes.append(Scene(context, size, puppets, BODY))
     scene = scenes[0]
     shares = reach(scene.camera, scene.stage.boxes, scene.stage.aspect)
-    assert shares.max() < 0.8
+    assert shares.max() < FULL
     assert shares[:, 0].max() > 0.5 or shares[:, 1].max() > 0.5, "and not from afar"
 
 
@@ -108,10 +89,10 @@ def test_the_camera_sees_all_that_is_filled_in_the_show(
     scene.frame_all([Reach(box, box) for box in filled])
     places = np.array([character.position for character in scene._characters])
     shares = reach(scene.camera, filled + places[:, None], scene.stage.aspect)
-    assert shares.max() <= 0.8 + 1e-6, "inside the margins"
-    assert shares.max() > 0.7, "which it fills"
+    assert shares.max() <= FULL + 1e-6, "inside the margins"
+    assert shares.max() > FULL - 0.1, "which it fills"
     at_rest = reach(scene.camera, scene.stage.boxes, scene.stage.aspect)
-    assert at_rest.max() <= 0.8 + 1e-6
+    assert at_rest.max() <= FULL + 1e-6
     rotation = scene.camera.view_rotation
     scene.camera = scene.camera.zoom(3.0)
     scene.frame_all()
@@ -131,139 +112,6 @@ def test_framing_does_not_move_who_is_framed(
     np.testing.assert_array_equal(scene.stage.boxes, before)
     np.testing.assert_allclose(scene.camera.eye, camera.eye, atol=1e-9)
     np.testing.assert_allclose(scene.camera.target, camera.target, atol=1e-9)
-
-
-class Abroad(Puppet):
-    """A puppet that travels as a test says."""
-
-    away = (0.0, 0.0)
-
-    @property
-    def travelled(self) -> np.ndarray:
-        return np.array(self.away)
-
-    def motion(self) -> Motion:
-        moved = self.character.vertices + np.array([self.away[0], 0.0, self.away[1]])
-        return Motion(np.ascontiguousarray(moved), None)
-
-
-def reach_along(puppet: Puppet, way: tuple[float, float]) -> Reach:
-    vertices = puppet.character.vertices
-    box = np.array([vertices.min(axis=0), vertices.max(axis=0)])
-    moved = box + np.array([way[0], 0.0, way[1]])
-    return Reach(box, np.array([np.minimum(box, moved)[0], np.maximum(box, moved)[1]]))
-
-
-def sent(scene: Scene, puppet: Abroad, way: tuple[float, float], seconds: float = 6.0) -> None:
-    """Let a puppet walk this way, and the scene glide after it until it rests."""
-    for number in range(round(seconds * 30)):
-        share = min(number / (seconds * 15.0), 1.0)
-        puppet.away = (share * way[0], share * way[1])
-        scene.follow(number / 30.0)
-
-
-@pytest.fixture
-def abroad() -> Abroad:
-    return Abroad(make_figure(name="one"))
-
-
-@pytest.mark.parametrize("way", [(8.0, 0.0), (-3.0, -6.0), (0.0, 7.0)])
-@pytest.mark.parametrize("is_live", [False, True])
-def test_who_goes_far_is_followed_by_camera_light_and_curtain(
-    context: moderngl.Context,
-    abroad: Abroad,
-    scenes: list[Scene],
-    way: tuple[float, float],
-    is_live: bool,
-) -> None:
-    scenes.append(Scene(context, SIZE, [abroad], BODY))
-    scene = scenes[0]
-    if not is_live:
-        scene.frame_all([reach_along(abroad, way)])
-    scene.show(None, [abroad.motion()])
-    home = scene.picture().astype(int)
-    sent(scene, abroad, way)
-    scene.show(None, [abroad.motion()])
-    there = scene.picture().astype(int)
-    shares = reach(scene._gliding_camera(), scene.stage.boxes, scene.stage.aspect)
-    assert shares.max() < 0.95, "the puppet is in the picture"
-    assert there[..., :3].mean() == pytest.approx(home[..., :3].mean(), rel=0.15), (
-        "and in its light"
-    )
-    edges = np.concatenate([home[:, 0], home[:, -1]]), np.concatenate([there[:, 0], there[:, -1]])
-    assert edges[1][:, :3].mean() > 0.5 * edges[0][:, :3].mean(), "with the curtain at its sides"
-
-
-def test_a_short_way_is_seen_whole_by_a_camera_that_stands_still(
-    context: moderngl.Context, abroad: Abroad, scenes: list[Scene]
-) -> None:
-    scenes.append(Scene(context, SIZE, [abroad], BODY))
-    scene = scenes[0]
-    scene.frame_all([reach_along(abroad, (1.0, 0.0))])
-    still = scene.camera
-    for way in ((0.0, 0.0), (1.0, 0.0)):
-        sent(scene, abroad, way)
-        scene.show(None, [abroad.motion()])
-        assert scene._gliding_camera() is still
-        assert reach(still, scene.stage.boxes, scene.stage.aspect).max() <= 0.8 + 1e-6
-
-
-def test_who_stays_in_place_is_framed_there_and_followed_if_let_go(
-    context: moderngl.Context, abroad: Abroad, scenes: list[Scene]
-) -> None:
-    scenes.append(Scene(context, SIZE, [abroad], BODY))
-    scene = scenes[0]
-    scene.frame_all([reach_along(abroad, (1.0, 0.0))])
-    whole = scene.camera
-    abroad.travel.in_place = True
-    scene.frame_all()
-    assert scene.camera.distance < whole.distance
-    sent(scene, abroad, (1.0, 0.0))
-    assert scene._gliding_camera().target[0] > 0.8
-
-
-def test_what_the_user_does_with_the_camera_stays_on_top(
-    context: moderngl.Context, abroad: Abroad, scenes: list[Scene]
-) -> None:
-    scenes.append(Scene(context, SIZE, [abroad], BODY))
-    scene = scenes[0]
-    sent(scene, abroad, (5.0, -2.0))
-    before = scene._gliding_camera()
-    scene.camera = scene.camera.zoom(2.0).orbit(0.3, 0.1)
-    after = scene._gliding_camera()
-    assert after.distance == pytest.approx(before.distance / 2.0)
-    np.testing.assert_allclose(after.target, before.target, atol=1e-9)
-    np.testing.assert_allclose(after.view_rotation, scene.camera.view_rotation, atol=1e-12)
-
-
-def test_those_who_part_are_all_in_view(
-    context: moderngl.Context, abroad: Abroad, scenes: list[Scene]
-) -> None:
-    pair = [abroad, Abroad(make_figure(WIDE, name="two"))]
-    scenes.append(Scene(context, SIZE, pair, BODY))
-    scene = scenes[0]
-    for number in range(200):
-        pair[0].away, pair[1].away = (-number / 40.0, 0.0), (number / 40.0, 0.0)
-        scene.follow(number / 30.0)
-    scene.show(None, [puppet.motion() for puppet in pair])
-    shares = reach(scene._gliding_camera(), scene.stage.boxes, scene.stage.aspect)
-    assert shares.max() < 0.95
-
-
-def test_a_scene_put_back_draws_the_same(
-    context: moderngl.Context, abroad: Abroad, scenes: list[Scene]
-) -> None:
-    scenes.append(Scene(context, SIZE, [abroad], BODY))
-    scene = scenes[0]
-    sent(scene, abroad, (3.0, 0.0), 2.0)
-    state, there = scene.snapshot(), abroad.away
-    scene.show(None, [abroad.motion()])
-    was = scene.picture()
-    sent(scene, abroad, (-4.0, 1.0))
-    scene.restore(state)
-    abroad.away = there
-    scene.show(None, [abroad.motion()])
-    np.testing.assert_array_equal(scene.picture(), was)
 
 
 def picture(scene: Scene, puppets: Sequence[Puppet], moment: Pose | None) -> np.ndarray:
@@ -323,6 +171,29 @@ def test_the_mirror_shows_the_performer(
     assert differ(standing, level) > 2
     changed = np.argwhere(np.abs(standing - without).max(axis=2) > 32)
     assert np.ptp(changed[:, 1]) < SIZE[0] / 2, "in a corner, and nowhere else"
+
+
+@pytest.mark.parametrize("quarters", [0, 1, -1])
+def test_a_puppet_in_profile_has_its_performer_seen_from_the_same_side(
+    context: moderngl.Context, scenes: list[Scene], quarters: int
+) -> None:
+    about = Rotation.from_rotvec([0.0, quarters * np.pi / 2.0, 0.0])
+    figure = make_figure(name="one")
+    names, parents = figure.skeleton.names, figure.skeleton.parents
+    skeleton = Skeleton(names, parents, about.apply(figure.skeleton.rest_positions.copy()))
+    plan = plan_by_names(skeleton)
+    vertices = about.apply(figure.vertices.copy())
+    puppet = Puppet(replace(figure, vertices=vertices, skeleton=skeleton, plan=plan))
+    scenes.append(Scene(context, SIZE, [puppet], BODY))
+    forward = {"ShoulderLeft": (-np.pi / 2.0, 0.0, 0.0), "ShoulderRight": (-np.pi / 2.0, 0.0, 0.0)}
+    ends = []
+    for turns in (T_POSE, forward):
+        scenes[-1].draw(seen(pose(turns)))
+        ends.append(scenes[-1]._inset.capsules[:, 4:6])
+    widths = [np.ptp(each[:, 0]) for each in ends]
+    assert (widths[0] > widths[1]) == (quarters == 0)
+    from_head = ends[1][:, 0] - ends[1][np.argmax(ends[1][:, 1]), 0]
+    assert np.sign(round(float(from_head.max() + from_head.min()), 2)) == quarters, "arms forward"
 
 
 def test_who_moves_is_seen_moving(
