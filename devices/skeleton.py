@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -101,6 +102,8 @@ class SkeletonFrame:
         confidence: (J,) in [0, 1]; 0 exactly where the position is NaN.
         performer: number of the performer; a person keeps it from frame to frame.
         arrival: host monotonic time [s] at which the frame came in; NaN if a recording lacks it.
+        blends: weights in [0, 1] of the face's blend shapes by name, at most 512 of them, or None
+            when the source has none; a source that sends them less often repeats the last ones.
     """
 
     time: float
@@ -109,6 +112,7 @@ class SkeletonFrame:
     confidence: NDArray[np.float64]
     performer: int = 0
     arrival: float = float("nan")
+    blends: Mapping[str, float] | None = None
 
     def __post_init__(self) -> None:
         count = len(self.positions)

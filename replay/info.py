@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from devices.blend_shapes import Blends
 from replay.recording import Recording
 
 GAP_FACTOR = 3.0  # a step of more than this many medians is a gap
@@ -56,6 +58,8 @@ def summary(recording: Recording, path: Path, kind: str) -> list[str]:
         f"size        {_size(recording)}",
         f"rotations   {'none' if recording.rotations is None else 'of every joint'}",
     ]
+    if recording.blends is not None:
+        lines.append(f"blends      {_blends(recording.blends)}")
     if np.isfinite(recording.arrivals).any():
         lines.append(f"latency     {_latency(recording)}")
     return lines + [f"note        {note}" for note in recording.notes]
@@ -172,6 +176,17 @@ def _size(recording: Recording) -> str:
         return "nothing was seen"
     extent = points.max(axis=0) - points.min(axis=0)
     return "moves within " + " x ".join(f"{length:.2f}" for length in extent) + " m"
+
+
+def _blends(blends: Sequence[Blends | None]) -> str:
+    faces = [face for face in blends if face is not None]
+    names = sorted({name for face in faces for name in face})
+    moving = sum(len({face.get(name) for face in faces}) > 1 for name in names)
+    share = 100 * len(faces) / len(blends)
+    return (
+        f"{len(names)} blend shapes in {share:.0f} % of frames, {moving} of them move: "
+        f"{_shown(', '.join(names))}"
+    )
 
 
 def _latency(recording: Recording) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from devices.blend_shapes import Blends
 from devices.errors import InputError
 from devices.skeleton import Skeleton, SkeletonFrame
 
@@ -26,6 +27,8 @@ class Recording:
         performers: (T,) int, the performer of each frame.
         arrivals: (T,) [s] arrival of each frame; NaN where the file has none.
         notes: guesses and corrections of the reader, one short line each, for `bunraku info`.
+        blends: of each frame the weights of its face's blend shapes as in `SkeletonFrame`, T of
+            them; None where no frame has any.
         source: facts about the origin of the frames, if the file has them: short texts by name.
 
     Raises:
@@ -41,6 +44,7 @@ class Recording:
     arrivals: NDArray[np.float64]
     notes: tuple[str, ...] = ()
     source: Mapping[str, str] = field(default_factory=dict)
+    blends: tuple[Blends | None, ...] | None = None
 
     def __post_init__(self) -> None:
         frames, joints = len(self.times), len(self.skeleton.names)
@@ -59,6 +63,8 @@ class Recording:
                 raise ValueError(
                     f"Expected `{name}` to have shape {shape}, got {getattr(self, name).shape}"
                 )
+        if self.blends is not None and len(self.blends) != frames:
+            raise ValueError(f"Expected {frames} faces in `blends`, got {len(self.blends)}")
 
     def __len__(self) -> int:
         return len(self.times)
@@ -77,6 +83,7 @@ class Recording:
             confidence=self.confidence[index],
             performer=int(self.performers[index]),
             arrival=float(self.arrivals[index]),
+            blends=None if self.blends is None else self.blends[index],
         )
 
     def of(self, performer: int) -> Recording:
@@ -99,4 +106,7 @@ class Recording:
             confidence=self.confidence[own],
             performers=self.performers[own],
             arrivals=self.arrivals[own],
+            blends=None
+            if self.blends is None
+            else tuple(face for face, mine in zip(self.blends, own, strict=True) if mine),
         )

@@ -3,8 +3,9 @@
 Every message is one ZeroMQ frame: the magic ``BNRK``, a version byte, a kind byte, two zero bytes,
 then the fields of the kind, little-endian. The first six bytes keep their meaning in every version,
 so programs of different versions can report the mismatch. The subscriber sends one kind, `Call`:
-its identity, its credit, the frames received so far, and its clock. The publisher sends three:
-`Answer`, `Announcement` (the skeleton) and `Sample` (one frame).
+its identity, its credit, the frames received so far, and its clock. The publisher sends four:
+`Answer`, `Announcement` (the skeleton), `Sample` (one frame) and, just before the sample of a frame
+with a face, `FaceWeights`. Programs that do not know faces count those as refused and go on.
 
 Numbers are float64, so a recording made by the subscriber equals one made on the capture machine,
 bit for bit. A joint that was not seen is NaN with confidence 0.
@@ -21,6 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from devices.blend_shapes import Blends, checked_blends
 from devices.bridge.sanitize import make_safe
 from devices.errors import InputError
 from devices.skeleton import Skeleton, SkeletonFrame
@@ -38,6 +40,7 @@ _CALL = struct.Struct("<QQQdHB")
 _ANSWER = struct.Struct("<QQddd")
 _SESSION = struct.Struct("<Q")
 _SAMPLE = struct.Struct("<QQdIHB")
+_FACE = struct.Struct("<QQ")
 _ROTATIONS = 1
 _FARTHEST_REST = 1000.0  # [m]
 _BAD = (ValueError, TypeError, KeyError, OverflowError, RecursionError, InputError)
@@ -103,8 +106,8 @@ class Sample:
     rotations: NDArray[np.float64] | None
     confidence: NDArray[np.float64]
 
-    def frame(self, time: float, arrival: float) -> SkeletonFrame:
-        """Return the frame with a time and an arrival on the subscriber's clock [s]."""
+    def frame(self, time: float, arrival: float, blends: Blends | None = None) -> SkeletonFrame:
+        """Return the frame with its face, at a time and arrival on the subscriber's clock [s]."""
         return SkeletonFrame(
             time=time,
             positions=self.positions,
@@ -112,7 +115,17 @@ class Sample:
             confidence=self.confidence,
             performer=self.performer,
             arrival=arrival,
+            blends=blends,
         )
+
+
+@dataclass(frozen=True, slots=True)
+class FaceWeights:
+    """Publisher to subscriber: the blend shapes of the frame with this sequence number."""
+
+    session: int
+    sequence: int
+    blends: Blends
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,7 +135,7 @@ class OtherVersion:
     version: int
 
 
-Message = Call | Answer | Announcement | Sample | OtherVersion
+Message = Call | Answer | Announcement | Sample | FaceWeights | OtherVersion
 
 
 def encode_call(call: Call) -> bytes:
@@ -170,6 +183,13 @@ def encode_sample(session: int, sequence: int, frame: SkeletonFrame) -> bytes:
             _SAMPLE.pack(*head, 0 if rotations is None else _ROTATIONS),
             *(array.astype("<f8", copy=False).tobytes() for array in arrays),
         ]
+    )
+
+
+def encode_face(session: int, sequence: int, blends: Blends) -> bytes:
+    """Return the bytes of a frame's blend shapes."""
+    return (
+        _head(5) + _FACE.pack(session, sequence) + json.dumps(blends, ensure_ascii=False).encode()
     )
 
 
@@ -242,9 +262,22 @@ def _decode_sample(body: bytes) -> Sample | None:
     return Sample(session, sequence, time, performer, positions, turned, confidence)
 
 
+def _decode_face(body: bytes) -> FaceWeights | None:
+    if len(body) < _FACE.size:
+        return None
+    session, sequence = _FACE.unpack_from(body)
+    try:
+        found = json.loads(body[_FACE.size :])
+    except _BAD:
+        return None
+    blends = checked_blends(found.items()) if isinstance(found, dict) else None
+    return None if blends is None else FaceWeights(session, sequence, blends)
+
+
 _DECODERS: dict[int, Callable[[bytes], Message | None]] = {
     1: _decode_call,
     2: _decode_answer,
     3: _decode_announcement,
     4: _decode_sample,
+    5: _decode_face,
 }

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from devices.blend_shapes import Blends
 from devices.bridge.clock_offset import ClockOffset
 from devices.bridge.messages import (
     LATEST,
@@ -21,6 +22,7 @@ from devices.bridge.messages import (
     Announcement,
     Answer,
     Call,
+    FaceWeights,
     OtherVersion,
     Sample,
     decode,
@@ -70,6 +72,7 @@ class BridgeReceiver:
         self._came = 0  # the highest sequence number received
         self._granted = 0  # the highest sequence number that the publisher may send
         self._called_at = float("-inf")
+        self._face: FaceWeights | None = None  # of the sample that comes next
         self._last: dict[int, float] = {}  # each performer's newest time [s]
         make_safe(np.zeros((1, 3)), np.zeros(1), np.zeros((1, 4)))  # compile before the first frame
 
@@ -87,6 +90,8 @@ class BridgeReceiver:
                 self._answer(answer, arrival)
             case Announcement() as announcement:
                 self._announcement(announcement)
+            case FaceWeights() as face:
+                self._face = face
             case OtherVersion(version):
                 self.other_version = version
             case _:
@@ -155,7 +160,13 @@ class BridgeReceiver:
         self.lost += sample.sequence - self._came - 1
         self._came = sample.sequence
         time = min(sample.time - self.clock.seconds, arrival)
-        return [sample.frame(self._rising(sample.performer, time), arrival)]
+        return [sample.frame(self._rising(sample.performer, time), arrival, self._face_of(sample))]
+
+    def _face_of(self, sample: Sample) -> Blends | None:
+        face = self._face
+        if face is None or (face.session, face.sequence) != (sample.session, sample.sequence):
+            return None
+        return face.blends
 
     def _fits(self, sample: Sample) -> bool:
         return self.skeleton is not None and len(sample.positions) == len(self.skeleton.names)

@@ -10,11 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from devices.blend_shapes import Blends, checked_blends
 from devices.bodies.camera_position import camera_position
 from devices.bodies.performer_numbers import PerformerNumbers
 from devices.mediapipe.joints import (
@@ -64,6 +66,7 @@ class LandmarkDecoder:
         self._numbers = PerformerNumbers()
         self._origin: Array | None = None
         self._places: dict[int, Array] = {}
+        self._faces: dict[int, Blends] = {}
 
     @property
     def skeleton(self) -> Skeleton:
@@ -88,10 +91,23 @@ class LandmarkDecoder:
         }
         places = {body: self._place(*bodies[body], message, body) for body in bodies}
         numbers = self._numbers(places)
+        self._watch_faces(message, ids)
         return [
-            _frame(self._joints(person, extras), places[body], numbers[body], (time, arrival))
+            replace(
+                _frame(self._joints(person, extras), places[body], numbers[body], (time, arrival)),
+                blends=self._faces.get(body),
+            )
             for body, (person, extras) in bodies.items()
         ]
+
+    def _watch_faces(self, message: Mapping[str, Any], ids: Sequence[int]) -> None:
+        """Remember the blend shapes of each face; one that is not seen keeps its last ones."""
+        faces = _faces(message.get("face_blendshapes"))
+        for body, face in zip(ids, faces, strict=False):
+            if face is not None:
+                if body not in self._faces and len(self._faces) >= MOST_PEOPLE:
+                    self._faces.clear()
+                self._faces[body] = face
 
     def _extras(self, message: Mapping[str, Any], row: int) -> dict[str, Array]:
         """The optional landmarks of the person in `row`: image and hands."""
@@ -159,6 +175,31 @@ def _frame(joints: Array, place: Array, number: int, times: tuple[float, float])
         performer=number,
         arrival=times[1],
     )
+
+
+def _faces(value: Any) -> list[Blends | None]:
+    """The blend shapes of each face: lists of MediaPipe's categories, or objects by name.
+
+    A single face, as MediaPipe's holistic model gives it, becomes a list of one.
+    """
+    if isinstance(value, dict) or (
+        isinstance(value, list) and value and isinstance(value[0], dict) and "score" in value[0]
+    ):
+        value = [value]
+    return [_face(face) for face in value[:MOST_PEOPLE]] if isinstance(value, list) else []
+
+
+def _face(face: Any) -> Blends | None:
+    pairs: list[tuple[Any, Any]] = []
+    if isinstance(face, dict):
+        pairs = list(face.items())
+    elif isinstance(face, list):
+        shapes = [shape for shape in face if isinstance(shape, dict)]
+        pairs = [
+            (shape.get("category_name", shape.get("categoryName")), shape.get("score"))
+            for shape in shapes
+        ]
+    return checked_blends(pair for pair in pairs if pair[0] != "_neutral")
 
 
 def _people(value: Any, count: int) -> list[Array | None] | None:

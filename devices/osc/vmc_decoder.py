@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
+from devices.blend_shapes import MOST_BLENDS, Blends, blend_weight
 from devices.bodies.humanoid_kernels import read_bones
 from devices.bodies.humanoid_pose import COUNT, SKELETON, HumanoidPose
 from devices.osc.layouts import Layouts
@@ -30,8 +31,6 @@ from devices.transport.frame_assembly import FrameAssembly
 MARIONETTE, PERFORMER = "marionette", "performer"
 """Roles of the protocol: a marionette receives a performer's pose, a performer receives devices."""
 
-MOST_EXPRESSIONS = 512
-
 
 class VmcDecoder:
     """Frames of one sender's messages.
@@ -44,7 +43,8 @@ class VmcDecoder:
 
     Attributes:
         refused: datagrams and messages that were malformed, late or implausible.
-        expressions: weights of the face's expressions, as committed by the sender.
+        expressions: weights in [0, 1] of the face's expressions, as committed by the sender; one
+            that is not sent again keeps its weight.
         layouts: of the packets with many bones; other packets are read message by message.
     """
 
@@ -58,7 +58,7 @@ class VmcDecoder:
         tpose: float | None = None,
     ) -> None:
         self.refused = 0
-        self.expressions: Mapping[str, float] = {}
+        self.expressions: Blends = {}
         self.layouts: Layouts[Plan] = Layouts()
         self._pose = HumanoidPose()
         self._assembly = FrameAssembly()
@@ -244,16 +244,17 @@ class VmcDecoder:
         if not message.tags.startswith("sf"):
             return False
         name, value = message.arguments[:2]
-        assert isinstance(name, str)
-        assert isinstance(value, float)
-        full = len(self._weights) >= MOST_EXPRESSIONS and name not in self._weights
-        if full or not math.isfinite(value):
+        weight = blend_weight(name, value)
+        full = len(self._weights) >= MOST_BLENDS and name not in self._weights
+        if full or weight is None:
             return False
-        self._weights[name] = value
+        self._weights[str(name)] = weight
         return True
 
     def _apply(self, message: Message, arrival: float) -> bool:
-        self.expressions, self._weights = self._weights, {}
+        held = {**self.expressions, **self._weights}
+        self.expressions = held if len(held) <= MOST_BLENDS else self._weights
+        self._weights = {}
         return True
 
     # Frames.
@@ -313,6 +314,7 @@ class VmcDecoder:
                 rotations=rotations,
                 confidence=confidence,
                 arrival=arrival,
+                blends=self.expressions or None,
             )
         )
 

@@ -2,8 +2,8 @@
 
 Each datagram is one scene in version 2 or 3 of the format, as plain JSON or as an LZ4 frame. Every
 bone has an absolute position [m] and rotation in Unity's space; rotations keep the local axes of
-Rokoko's own rig. The scene's time starts again when a clip loops. Faces, props and trackers are
-ignored.
+Rokoko's own rig. The scene's time starts again when a clip loops. An actor's face in version 3, by
+ARKit's 52 names, becomes blend shapes. Faces of version 2, props and trackers are ignored.
 
 Source: Rokoko Studio's custom streaming documentation, and its plug-ins.
 """
@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.address import host_and_port, options_of
+from devices.blend_shapes import Blends, checked_blends
 from devices.bodies.unity_space import across_unity, turn_across_unity
 from devices.skeleton import SkeletonFrame
 from devices.suits.rokoko_bones import SKELETON
@@ -111,6 +112,7 @@ class RokokoDecoder:
             confidence=seen * 1.0,
             performer=self._number_of(name),
             arrival=arrival,
+            blends=_face(actor.get("face")),
         )
 
     def _bones(self, body: Mapping[str, Any]) -> tuple[Array, Array]:
@@ -165,6 +167,13 @@ def _unpacked(data: bytes) -> bytes | None:
     except (RuntimeError, ValueError, MemoryError):
         return None
     return text if frame.eof and not frame.unused_data else None
+
+
+def _face(face: Any) -> Blends | None:
+    """The weights in [0, 1] of an actor's blend shapes, which Rokoko sends as 0 to 100."""
+    if not isinstance(face, dict):
+        return None
+    return checked_blends((name, _number(value) / 100.0) for name, value in face.items())
 
 
 def _pose(bone: Any) -> tuple[float, ...]:

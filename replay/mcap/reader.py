@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from itertools import islice
 from pathlib import Path
 from typing import Self
@@ -10,6 +10,7 @@ from typing import Self
 import numpy as np
 from mcap.records import Channel, Chunk, Message, Metadata
 
+from devices.blend_shapes import Blends
 from devices.errors import InputError
 from devices.skeleton import Skeleton, SkeletonFrame
 from replay.mcap.frame_json import (
@@ -203,6 +204,7 @@ def stack_frames(
     if any(frame.rotations is not None for frame in frames):
         unknown = np.full((len(skeleton.names), 4), np.nan)
         rotations = np.stack([unknown if (r := frames[i].rotations) is None else r for i in order])
+    blends = _shared(frames[i].blends for i in order)
     return Recording(
         skeleton=skeleton,
         times=times[order] - start,
@@ -213,7 +215,16 @@ def stack_frames(
         arrivals=np.array([frames[i].arrival for i in order]) - start,
         notes=notes,
         source=dict(source or {}),
+        blends=blends if any(face is not None for face in blends) else None,
     )
+
+
+def _shared(faces: Iterable[Blends | None]) -> tuple[Blends | None, ...]:
+    """The faces; one that repeats the face before is the same object, and takes no room."""
+    shared: list[Blends | None] = []
+    for face in faces:
+        shared.append(shared[-1] if shared and shared[-1] == face else face)
+    return tuple(shared)
 
 
 def _notes(reader: McapReader, count: int) -> tuple[str, ...]:

@@ -69,6 +69,7 @@ class Watch:
         state, detail: the line to print.
         performers: the numbers of the performers whose frames arrived.
         joints: the most joints that one frame had seen.
+        blends: the most blend shapes that one frame had.
         traffic: counts of packets and frames; None where nothing could be opened, or for a device
             that is no live stream.
         silence: [s] since the last packet.
@@ -80,6 +81,7 @@ class Watch:
     detail: str = ""
     performers: set[int] = field(default_factory=set)
     joints: int = 0
+    blends: int = 0
     traffic: Traffic | None = None
     silence: float = float("nan")
     owner: Owner | None = None
@@ -146,6 +148,7 @@ def _poll(seen: Watch, stream: SkeletonStream) -> None:
     for frame in stream.poll():
         seen.performers.add(frame.performer)
         seen.joints = max(seen.joints, int(np.count_nonzero(frame.confidence)))
+        seen.blends = max(seen.blends, len(frame.blends or ()))
 
 
 def _not_opened(seen: Watch, reason: str) -> Watch:
@@ -173,7 +176,7 @@ def _described(seen: Watch, now: float, seconds: float) -> Watch:
         seen.detail = (
             f"{traffic.rate / max(people, 1):.1f} Hz, jitter {1e3 * traffic.jitter:.1f} ms, "
             f"last seen {seen.silence:.1f} s ago, {people} performer{'s' * (people != 1)}, "
-            f"{seen.joints} joints"
+            f"{seen.joints} joints" + (f", {seen.blends} blend shapes" if seen.blends else "")
         )
     elif traffic.packets:
         seen.state = State.UNCLEAR
@@ -232,6 +235,7 @@ def _figures(seen: Watch) -> dict[str, Any]:
         figures |= {
             "performers": sorted(seen.performers),
             "joints": seen.joints,
+            "blends": seen.blends,
             "rate": seen.traffic.rate / max(len(seen.performers), 1),
             "jitter_ms": 1e3 * seen.traffic.jitter,
             "last_seen_s": seen.silence if np.isfinite(seen.silence) else None,

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from devices.blend_shapes import Blends, mirrored_blends
 from devices.bodies.joint_labels import heading_joints, hips_joint, label_joints
 from devices.bodies.joint_names import Kind
 from devices.bodies.source_joints import source_joints, source_tree
@@ -41,6 +42,7 @@ class Pose:
         time: [s] of the frame; NaN where it does not matter.
         performer: the performer's number.
         rotations: (J, 4) joint to world, NaN where unknown; None where the source has none.
+        blends: weights of the face's blend shapes by name; None where the source has none.
     """
 
     seen: Array
@@ -56,6 +58,7 @@ class Pose:
     time: float = float("nan")
     performer: int = 0
     rotations: Array | None = None
+    blends: Blends | None = None
 
     def facing(self, heading: float) -> Array:
         """Return every joint (J, 3) [m] with the whole body turned to this heading [rad]."""
@@ -147,6 +150,7 @@ class Performer:
             time=frame.time,
             performer=frame.performer,
             rotations=self._rotations(frame, whole.mirrored),
+            blends=_blends(frame, whole.mirrored),
         )
         return self.pose
 
@@ -192,3 +196,9 @@ class Performer:
     def rest_tree(self) -> Tree:
         """Return the chosen joints as a tree, in the rest pose of the skeleton."""
         return Tree(self._parents, self.skeleton.rest_positions[self.joints])
+
+
+def _blends(frame: SkeletonFrame, mirror: bool) -> Blends | None:
+    if frame.blends is None or not mirror:
+        return frame.blends
+    return mirrored_blends(frame.blends)

@@ -58,6 +58,7 @@ class BridgePerformer:
                     rotations=None,
                     confidence=np.where(pose.filled | pose.corrected, GUESSED, 1.0),
                     performer=pose.performer,
+                    blends=pose.blends,
                 )
             )
 

@@ -18,11 +18,17 @@ BYTES = 64 << 20
 
 @dataclass(frozen=True, slots=True)
 class Parcel:
-    """An encoded frame; all subscribers share its bytes."""
+    """An encoded frame, and its face or nothing; all subscribers share the bytes."""
 
     sequence: int
     performer: int
     data: bytes
+    face: bytes = b""
+
+    @property
+    def size(self) -> int:
+        """Bytes of both."""
+        return len(self.data) + len(self.face)
 
 
 class BridgeQueue(Protocol):
@@ -116,15 +122,15 @@ class LosslessQueue:
     def offer(self, parcel: Parcel) -> None:
         """Add the newest frame."""
         self._waiting.append(parcel)
-        self._kept += len(parcel.data)
+        self._kept += parcel.size
         while self._kept > self._limit and len(self._waiting) > 1:
-            self._kept -= len(self._waiting.popleft().data)
+            self._kept -= self._waiting.popleft().size
             self.dropped += 1
 
     def received(self, sequence: int) -> None:
         """Release every frame up to `sequence`."""
         while self._flying and self._flying[0].sequence <= sequence:
-            self._kept -= len(self._flying.popleft().data)
+            self._kept -= self._flying.popleft().size
 
     def reconnect(self, sequence: int) -> None:
         """Queue the unacknowledged frames again."""

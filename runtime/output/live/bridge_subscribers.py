@@ -20,6 +20,7 @@ from devices.bridge.messages import (
     decode,
     encode_announcement,
     encode_answer,
+    encode_face,
     encode_sample,
 )
 from devices.skeleton import Skeleton, SkeletonFrame
@@ -91,9 +92,12 @@ class BridgeSubscribers:
         """Queue the newest frame for every subscriber."""
         self.frames += 1
         if self._subscribers:
-            data = encode_sample(self._session, self.frames, frame)
+            data, face = encode_sample(self._session, self.frames, frame), b""
+            if frame.blends:
+                face = encode_face(self._session, self.frames, frame.blends)
+            parcel = Parcel(self.frames, frame.performer, data, face)
             for subscriber in self._subscribers.values():
-                subscriber.queue.offer(Parcel(self.frames, frame.performer, data))
+                subscriber.queue.offer(parcel)
 
     def read(self, route: bytes, data: bytes) -> list[bytes]:
         """Read one message from one connection, and return the replies to it. Never raises."""
@@ -113,6 +117,8 @@ class BridgeSubscribers:
         for subscriber in self._subscribers.values():
             while (parcel := subscriber.queue.draw(subscriber.credit)) is not None:
                 self.sent += 1
+                if parcel.face:
+                    yield subscriber.route, parcel.face
                 yield subscriber.route, parcel.data
 
     def forget(self) -> int:

@@ -1,7 +1,8 @@
 """Output of the first performer as VMC: the VMC role "performer", which sends to a "marionette".
 
 Source: sh-akira/VirtualMotionCaptureProtocol, performer specification: per frame the root, the
-bones, OK and the time, in bundles of at most 1500 bytes with their UDP and IP headers.
+bones, the blend shapes of a face if there is one, OK and the time, in bundles of at most 1500 bytes
+with their UDP and IP headers.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import socket
 import struct
 from typing import Self
 
+from devices.blend_shapes import Blends
 from devices.bodies.unity_space import across_unity, turn_across_unity
 from devices.errors import InputError
 from devices.osc.messages import write_bundles, write_message
@@ -64,6 +66,8 @@ class VmcPerformer:
         messages = [self._root]
         for head, (offset, turn) in zip(self._heads, rows, strict=True):
             messages.append(head + struct.pack(">7f", *offset, *turn))
+        if pose.blends is not None:
+            messages += _face(pose.blends)
         messages.append(write_message("/VMC/Ext/OK", "iii", 1, CALIBRATED, 0))
         messages.append(write_message("/VMC/Ext/T", "f", frame.time - self._began))
         for bundle in write_bundles(messages, LONGEST):
@@ -81,6 +85,14 @@ class VmcPerformer:
 
     def __exit__(self, *exc: object) -> None:
         self.close()
+
+
+def _face(blends: Blends) -> list[bytes]:
+    """The messages that set every blend shape, under the names that its source gave it."""
+    values = [
+        write_message("/VMC/Ext/Blend/Val", "sf", name, weight) for name, weight in blends.items()
+    ]
+    return [*values, write_message("/VMC/Ext/Blend/Apply", "")]
 
 
 def _socket_to(host: str, port: int) -> tuple[socket.socket, tuple[str, int]]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import socket
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -86,6 +87,24 @@ def test_what_is_sent_is_what_is_received(marionette: socket.socket) -> None:
     first = found[0].positions
     assert first[HUMAN.index("LeftHand"), 0] > 0.2 > -0.2 > first[HUMAN.index("RightHand"), 0]
     assert np.diff([f.time for f in found]) == pytest.approx(7 / 60, abs=1e-3)
+
+
+def test_the_face_of_the_performer_goes_along_in_bundles_that_fit(
+    marionette: socket.socket,
+) -> None:
+    act = motion_clip("show")
+    performer, decoder = Performer(act.skeleton), VmcDecoder()
+    face = {f"shape {k}": k / 64 for k in range(64)} | {"喜び": 0.5}
+    frames: list[SkeletonFrame] = []
+    with VmcPerformer(performer.skeleton, *marionette.getsockname()) as output:
+        for index in range(3):
+            performer.follow(replace(seen(act.positions[index], index), blends=face))
+            output.write(performed(index, performer))
+            came = datagrams(marionette)
+            assert max(len(one) for one in came) <= LONGEST
+            frames += [f for one in came for f in decoder.feed(one, 10.0 + index / 60)]
+    assert [one.blends for one in frames] == [face] * 3
+    assert decoder.refused == 0
 
 
 def test_python_osc_reads_the_order_of_the_specification(marionette: socket.socket) -> None:
