@@ -11,6 +11,7 @@ from scipy.sparse import csr_array
 
 from devices.bodies.body_plan import BodyPlan
 from devices.skeleton import Skeleton
+from runtime.characters.morphs import Morphs
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,6 +65,7 @@ class Character:
         humanoid: nodes that the file declares to be bones of a humanoid, by VRM's names for them.
         plan: the parts of its body, of the skeleton's nodes; None where no body is recognised.
         notes: guesses and repairs, one short line each.
+        morphs: what blend shapes can move; None where the file has no morph targets.
     """
 
     name: str
@@ -76,6 +78,7 @@ class Character:
     humanoid: Mapping[str, int] = field(default_factory=dict)
     plan: BodyPlan | None = None
     notes: tuple[str, ...] = ()
+    morphs: Morphs | None = None
 
     def in_file_coordinates(self, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return file vertices (M, 3) in the file's frame for deformed welded vertices (N, 3)."""

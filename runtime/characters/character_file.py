@@ -23,11 +23,13 @@ from runtime.characters.file_to_stage import (
 )
 from runtime.characters.formats.mesh_data import FileMesh, MeshError
 from runtime.characters.formats.mesh_file import MESH_SUFFIXES, checked, read_mesh_file
-from runtime.characters.gltf.rig import read_gltf
+from runtime.characters.gltf.rig import GltfModel, read_gltf
+from runtime.characters.morphs import Morphs, welded_targets
 from runtime.characters.palette import palette_color
 from runtime.characters.weld import first_occurrences, weld, welded_weights
 
 RIG_SUFFIXES = (".glb", ".gltf", ".vrm")
+GOLDEN = (5.0**0.5 - 1.0) / 2.0
 SUFFIXES = MESH_SUFFIXES + RIG_SUFFIXES
 
 
@@ -79,8 +81,33 @@ def _from_rig(path: Path) -> Character:
     rig = None
     if model.skeleton is not None and model.weights is not None:
         rig = model.skeleton, model.weights
-    character = _standing(path, mesh, weld(mesh.vertices), rotation, rig)
-    return replace(character, humanoid=model.humanoid)
+    vertex = weld(mesh.vertices, _mixture(model))
+    character = _standing(path, mesh, vertex, rotation, rig)
+    return replace(
+        character, humanoid=model.humanoid, morphs=_morphs(model, vertex, character.file_to_stage)
+    )
+
+
+def _mixture(model: GltfModel) -> NDArray[np.float64] | None:
+    """Moves (M, 3) of the vertices by a mixture of all morph targets; None without any.
+
+    The weights are irrational multiples: two targets that differ do not cancel.
+    """
+    if not model.morphs:
+        return None
+    moves = np.zeros_like(model.file_vertices)
+    for number, (vertices, deltas) in enumerate(model.morphs):
+        np.add.at(moves, vertices, (0.5 + (number * GOLDEN) % 1.0) * deltas)
+    return moves
+
+
+def _morphs(
+    model: GltfModel, vertex: NDArray[np.int64], file_to_stage: NDArray[np.float64]
+) -> Morphs | None:
+    if not model.morphs and not model.expressions:
+        return None
+    targets = welded_targets(model.morphs, vertex).turned(file_to_stage[:3, :3])
+    return Morphs.of(targets, model.morph_names, model.expressions)
 
 
 def _standing(

@@ -27,6 +27,7 @@ def turned(character: Character, rotation: NDArray[np.float64], note: str) -> Ch
         skeleton=Skeleton(skeleton.names, skeleton.parents, skeleton.rest_positions @ rotation.T),
         file_to_stage=matrix @ character.file_to_stage,
         notes=(*character.notes, note),
+        morphs=None if character.morphs is None else character.morphs.turned(rotation),
     )
 
 

@@ -11,18 +11,29 @@ from scipy.spatial import cKDTree
 TOLERANCE = 1e-7
 """Share of the bounding box's diagonal: above float32 rounding, below any feature."""
 
+APART = 1e-3
+"""Share of the size by which morph targets must move two vertices apart to keep them two."""
+
 _NEIGHBOURS = 8  # searched around each vertex; bounds the cost of many vertices in one spot
 
 
-def weld(vertices: NDArray[np.float64]) -> NDArray[np.int64]:
+def weld(
+    vertices: NDArray[np.float64], moves: NDArray[np.float64] | None = None
+) -> NDArray[np.int64]:
     """The welded vertex (M,) of each file vertex, numbered by first appearance.
+
+    Lips that touch at rest stay two: vertices that morph targets move apart are not welded.
 
     Args:
         vertices: (M, 3) finite, any unit; those closer than `TOLERANCE` times the size become
             one.
+        moves: (M, 3) of each vertex, by any mixture of its morph targets, or None without any;
+            those of vertices that become one differ by no more than `APART` times the size.
     """
-    positions, distinct = np.unique(vertices + 0.0, axis=0, return_inverse=True)  # -0 is 0
     reach = TOLERANCE * float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    if moves is not None:
+        vertices = np.hstack([vertices, moves * (TOLERANCE / APART)])
+    positions, distinct = np.unique(vertices + 0.0, axis=0, return_inverse=True)  # -0 is 0
     groups = _groups_within(positions, reach)[distinct.reshape(-1)]
     _, first, order = np.unique(groups, return_index=True, return_inverse=True)
     rank = np.empty(len(first), dtype=np.int64)

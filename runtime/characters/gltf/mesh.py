@@ -15,6 +15,7 @@ from runtime.characters.formats.mesh_data import MOST_FACES, MOST_VERTICES, Mesh
 from runtime.characters.gltf.checked_json import Entry
 from runtime.characters.gltf.file import COMPRESSIONS, GltfFile, compressed
 from runtime.characters.gltf.material import MaterialReader, texture_coordinates
+from runtime.characters.gltf.morphs import MorphReader, PartMorph
 from runtime.characters.gltf.scene import MOST_NODES, Scene
 
 Array = NDArray[np.float64]
@@ -33,6 +34,7 @@ class MeshPart:
         uvs: (m, 2), or None.
         material: its slot among the materials read.
         weights: (m, n) of the scene's n nodes, rows sum to 1, or None without a skin.
+        morphs: what its morph targets move.
     """
 
     node: int
@@ -42,10 +44,11 @@ class MeshPart:
     uvs: Array | None
     material: int
     weights: csr_array | None
+    morphs: tuple[PartMorph, ...] = ()
 
 
 def read_parts(
-    file: GltfFile, scene: Scene, look: MaterialReader
+    file: GltfFile, scene: Scene, look: MaterialReader, morphs: MorphReader
 ) -> tuple[list[MeshPart], list[str]]:
     """Read every primitive of the default scene that has triangles; note the others.
 
@@ -60,7 +63,7 @@ def read_parts(
             continue
         mesh = file.entry("meshes", entry.whole("mesh"))
         for primitive in mesh.children("primitives"):
-            part = _read_part(file, scene, look, node, primitive)
+            part = _read_part(file, scene, look, morphs, node, primitive)
             if part is None:
                 skipped += 1
                 continue
@@ -75,7 +78,12 @@ def read_parts(
 
 
 def _read_part(
-    file: GltfFile, scene: Scene, look: MaterialReader, node: int, primitive: Entry
+    file: GltfFile,
+    scene: Scene,
+    look: MaterialReader,
+    morphs: MorphReader,
+    node: int,
+    primitive: Entry,
 ) -> MeshPart | None:
     attributes = primitive.child("attributes") or Entry({}, primitive.place)
     mode = primitive.whole("mode", _TRIANGLES, below=7)
@@ -87,14 +95,14 @@ def _read_part(
         return None
     weights = _weights(file, node, attributes, len(positions))
     if weights is None:
-        to_scene = scene.to_scene[node]
-        vertices = positions @ to_scene[:3, :3].T + to_scene[:3, 3]
-        if np.linalg.det(to_scene[:3, :3]) < 0.0:
+        to_scene = scene.to_scene[node][:3, :3]
+        vertices = positions @ to_scene.T + scene.to_scene[node][:3, 3]
+        if np.linalg.det(to_scene) < 0.0:
             faces = faces[:, ::-1]  # section 3.7.4: a mirrored node turns its triangles over
         by_node = None
     else:
         skin, on_joints = weights
-        vertices, by_node = _skinned(file, scene, skin, on_joints, positions)
+        vertices, to_scene, by_node = _skinned(file, scene, skin, on_joints, positions)
     material = primitive.optional("material")
     return MeshPart(
         node,
@@ -104,6 +112,7 @@ def _read_part(
         _uvs(file, attributes, material, len(positions)),
         look.slot(material),
         by_node,
+        morphs.read(file.entry("nodes", node).whole("mesh"), primitive, positions, to_scene),
     )
 
 
@@ -227,8 +236,8 @@ def _normalized(weights: csr_array) -> csr_array:
 
 def _skinned(
     file: GltfFile, scene: Scene, skin: Entry, weights: csr_array, positions: Array
-) -> tuple[Array, csr_array]:
-    """Vertices posed by linear blend skinning, and their weights (m, n) by node."""
+) -> tuple[Array, Array, csr_array]:
+    """Vertices posed by linear blend skinning, how directions turn (m, 3, 3), weights (m, n)."""
     joints = skin.wholes("joints", below=len(file.entries("nodes")))
     to_joint = np.tile(np.eye(4), (len(joints), 1, 1))
     index = skin.optional("inverseBindMatrices")
@@ -246,4 +255,4 @@ def _skinned(
         (np.ones(len(joints)), (np.arange(len(joints)), joints)),
         shape=(len(joints), len(scene.parents)),
     )
-    return vertices, csr_array(weights @ node_of.tocsr())
+    return vertices, blended[:, :, :3], csr_array(weights @ node_of.tocsr())

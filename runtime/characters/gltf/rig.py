@@ -15,12 +15,15 @@ from devices.errors import InputError
 from devices.skeleton import Skeleton
 from runtime.characters.character import Material
 from runtime.characters.formats.mesh_data import MeshError, plain_material
+from runtime.characters.gltf.expressions import read_expressions
 from runtime.characters.gltf.file import GltfFile
 from runtime.characters.gltf.humanoid import humanoid_bones
 from runtime.characters.gltf.joints import Rig, build_rig, with_connections
 from runtime.characters.gltf.material import MaterialReader
 from runtime.characters.gltf.mesh import MeshPart, read_parts
+from runtime.characters.gltf.morphs import MorphReader
 from runtime.characters.gltf.scene import Scene, read_scene
+from runtime.characters.morphs import Expression
 from runtime.characters.rig_body import body_around
 
 Array = NDArray[np.float64]
@@ -44,6 +47,9 @@ class GltfModel:
         faces_backward: the character faces -Z, as VRM 0.x has it, instead of +Z.
         humanoid: the joints that the file declares to be bones of a humanoid, by VRM's names.
         notes: omissions and guesses, one short line each.
+        morphs: for each morph target the vertices (e,) that it moves, and their deltas (e, 3).
+        morph_names: of each target.
+        expressions: that a VRM file declares, of these targets.
     """
 
     file_vertices: Array
@@ -57,6 +63,9 @@ class GltfModel:
     faces_backward: bool
     humanoid: Mapping[str, int] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
+    morphs: tuple[tuple[NDArray[np.int64], Array], ...] = ()
+    morph_names: tuple[str, ...] = ()
+    expressions: tuple[Expression, ...] = ()
 
 
 def read_gltf(path: Path) -> GltfModel:
@@ -74,12 +83,13 @@ def read_gltf(path: Path) -> GltfModel:
 def _read(path: Path) -> GltfModel:
     file = GltfFile(path)
     scene = read_scene(file)
-    look = MaterialReader(file)
-    parts, notes = read_parts(file, scene, look)
+    look, morphs = MaterialReader(file), MorphReader(file)
+    parts, notes = read_parts(file, scene, look, morphs)
     joints = _skin_joints(file, parts)
     if not parts:
         return _dressed(file, scene, joints)
     model = _surface(parts, look, faces_backward="VRM" in _extensions(file), notes=notes)
+    model = _expressive(model, file, parts, morphs)
     if joints:
         bones, faults = _declared(file)
         model = replace(model, notes=(*model.notes, *faults))
@@ -92,6 +102,32 @@ def _read(path: Path) -> GltfModel:
         note = "its humanoid bones lie outside its mesh and no skin binds them: left out"
         return replace(model, notes=(*model.notes, note))
     return _rigged(model, rig, scene, parts, bones)
+
+
+def _expressive(
+    model: GltfModel, file: GltfFile, parts: list[MeshPart], reader: MorphReader
+) -> GltfModel:
+    """The model with its morph targets and expressions."""
+    expressions, faults = read_expressions(file, reader)
+    starts = np.cumsum([0, *(len(part.vertices) for part in parts)])
+    moves: list[list[tuple[NDArray[np.int64], Array]]] = [[] for _ in reader.names]
+    for part, start in zip(parts, starts, strict=False):
+        for morph in part.morphs:
+            moves[morph.target].append((morph.vertices + start, morph.deltas))
+    none = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+    return replace(
+        model,
+        morphs=tuple(
+            (
+                np.concatenate([none[0], *(vertices for vertices, _ in each)]),
+                np.concatenate([none[1], *(deltas for _, deltas in each)]),
+            )
+            for each in moves
+        ),
+        morph_names=tuple(reader.names),
+        expressions=expressions,
+        notes=(*model.notes, *dict.fromkeys(reader.notes), *faults),
+    )
 
 
 def _extensions(file: GltfFile) -> frozenset[str]:
