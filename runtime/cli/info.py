@@ -35,6 +35,8 @@ def _of_character(name: str) -> list[str]:
     from runtime.characters.open_character import load_character
 
     character = load_character(name)
+    morphs = character.morphs
+    blends = [] if morphs is None else [one.name for one in morphs.expressions if one.binds]
     width, height, depth = character.vertices.max(axis=0) - character.vertices.min(axis=0)
     parents = character.skeleton.parents
     leaves = set(range(len(parents))) - set(parents.tolist())
@@ -45,5 +47,6 @@ def _of_character(name: str) -> list[str]:
         f"nodes       {len(parents)}, {len(leaves)} of them leaves",
         f"rig         {'from the file' if character.weights is not None else 'none in the file'}",
         f"on stage    {width:.2f} x {height:.2f} x {depth:.2f} m",
+        f"blends      {', '.join(blends) or 'none'}",
         *(f"note        {note}" for note in character.notes),
     ]

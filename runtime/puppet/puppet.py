@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -15,6 +16,7 @@ from runtime.driving.performer import Pose
 from runtime.driving.targets import HandleTargets, PosedNodes, SkinnedTargets, Targets
 from runtime.puppet.bound_skeleton import BoundSkeleton
 from runtime.puppet.deformable_surface import DeformableSurface, SurfaceState
+from runtime.puppet.face import Face
 from runtime.puppet.placement import Stance, put_on_stage
 from runtime.puppet.travel import Travel, TravelState
 from solvers.deform.arap_cells import SPOKES
@@ -48,6 +50,7 @@ class PuppetState:
         travel: how much of its way it goes.
         driver_kind: the class of the driver; None without one.
         driver: of the driver.
+        face: (T,) the weights of the character's morph targets.
     """
 
     surface: SurfaceState
@@ -56,6 +59,7 @@ class PuppetState:
     travel: TravelState
     driver_kind: type[Driver] | None
     driver: Any
+    face: Array
 
 
 class Puppet:
@@ -66,6 +70,7 @@ class Puppet:
         iterations: of the solver, a frame. Where there are several, the last one comes after the
             surface is shown: see `settle`. Targets of a skin need one less, since they are nearer.
         energy: what is kept as rigid as possible: see `ArapSolver`.
+        tell: takes one line for the operator of the show.
 
     Attributes:
         character: what is moved.
@@ -74,9 +79,17 @@ class Puppet:
         surface: the character's surface.
         driver: what moves it; None before the first one.
         travel: how much of its way over the stage it goes.
+        face: its morph targets, which follow the performer's blend shapes.
     """
 
-    def __init__(self, character: Character, *, iterations: int = 2, energy: str = SPOKES) -> None:
+    def __init__(
+        self,
+        character: Character,
+        *,
+        iterations: int = 2,
+        energy: str = SPOKES,
+        tell: Callable[[str], None] | None = None,
+    ) -> None:
         self.character = character
         self.iterations = iterations
         proxy = proxy_of(character)
@@ -86,6 +99,7 @@ class Puppet:
         )
         self.driver: Driver | None = None
         self.travel = Travel()
+        self.face = Face(character, tell)
         self._targets = skeleton.at_rest
         self._standing = [np.empty_like(character.vertices) for _ in range(2)]
         self._root: Array = skeleton.tree.positions[skeleton.root]
@@ -98,9 +112,11 @@ class Puppet:
     def rest(self) -> None:
         """Go back to the rest pose, unless the driver has other targets for the next pose."""
         self._targets = self.bound_skeleton.at_rest
+        self.face.follow(None)
 
     def follow(self, pose: Pose) -> None:
-        """Take over the targets that the driver has for the performer's pose."""
+        """Take over the targets that the driver has for the performer's pose, and the face."""
+        self.face.follow(pose.blends)
         if self.driver is not None:
             self._targets = self.driver.targets(pose)
         self.travel.follow(pose.time)
@@ -141,6 +157,7 @@ class Puppet:
             self.travel.snapshot(),
             None if driver is None else type(driver),
             None if driver is None else driver.snapshot(),
+            self.face.weights.copy(),
         )
 
     def restore(self, state: PuppetState) -> None:
@@ -149,6 +166,7 @@ class Puppet:
         A driver of another class than that of the snapshot stays and begins anew.
         """
         self.surface.restore(state.surface)
+        self.face.restore(state.face)
         self._targets, self._stance = state.targets, state.stance
         self.travel.restore(state.travel)
         if self.driver is None:
@@ -189,6 +207,8 @@ class Puppet:
         standing = self._standing[0]
         placement = self.travel.of(targets.placement)
         self._stance = put_on_stage(vertices, placement, self._root, standing)
+        self._stance = put_on_stage(vertices, targets.placement, self._root, standing)
+        self.face.move(standing)
         nodes = None if targets.nodes is None else self._stance.place_nodes(targets.nodes)
         return Motion(standing, nodes)
 

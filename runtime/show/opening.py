@@ -151,7 +151,7 @@ class OpenedShow:
         return Performer(self._stream.skeleton, self._settings.match.source, self._conditioning)
 
     def _puppet(self, character: Character, own: CharacterSettings) -> Puppet:
-        puppet = Puppet(character, iterations=own.iterations, energy=own.energy)
+        puppet = Puppet(character, iterations=own.iterations, energy=own.energy, tell=self._warn)
         puppet.surface.elasticity = Elasticity(own.cartoon, own.volume_gain, own.stiffness)
         puppet.travel.in_place = self._settings.match.in_place
         for note in puppet.surface.notes:
