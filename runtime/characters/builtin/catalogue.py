@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from devices.errors import InputError
 from devices.skeleton import Skeleton
+from runtime.characters.builtin.blend_shapes import builtin_morphs
 from runtime.characters.character import Character, Material, Surface
 
 BUILTIN = ("squid", "cactus", "trex", "paper", "mannequin")
@@ -40,7 +41,8 @@ def builtin_character(name: str) -> Character:
         materials=(Material(np.ones(4, dtype=np.float32)),),
         face_material=np.zeros(len(faces), dtype=np.int64),
     )
-    return Character(name, vertices, faces, skeleton, None, surface, np.eye(4))
+    morphs = builtin_morphs(name, vertices, faces)
+    return Character(name, vertices, faces, skeleton, None, surface, np.eye(4), morphs=morphs)
 
 
 def linear_rgba(srgb: NDArray[np.uint8]) -> NDArray[np.float32]:
