@@ -27,6 +27,7 @@ from solvers.retarget.source_limbs import simplify
 LEAST_SEEN = 0.5  # share of the driving joints that must be in view to strike a pose
 CHOICES = 32  # poses of a rehearsal, evenly spaced, that the rest state is chosen from
 TRIED = 16  # poses of a rehearsal that the puppets try: those that differ most
+PLACED = 128  # poses of a rehearsal, evenly spaced, whose places on the stage are looked at
 
 Array = NDArray[np.float64]
 View = Callable[[], Array]
@@ -146,14 +147,15 @@ class MatchSession:
             For each puppet the room that it takes in those poses.
         """
         view = self._view()
-        evenly = np.unique(np.linspace(0, len(poses) - 1, CHOICES).round().astype(int))
+        evenly = _evenly(len(poses), CHOICES)
         states = [rest_state(poses[index], heading=0.0) for index in evenly]
         for match in self._matches:
             match.rehearse(clip, states, view)
         self.matching = False
         facing = np.array([pose.facing(0.0) - pose.hips for pose in poses])
         tried = [poses[index] for index in most_different_poses(facing, TRIED)]
-        return [match.try_out(tried, poses) for match in self._matches]
+        placed = [poses[index] for index in _evenly(len(poses), PLACED)]
+        return [match.try_out(tried, placed) for match in self._matches]
 
     def direct(self, frame: SkeletonFrame) -> None:
         """While matching, show the best match of the newest pose; accept it in time."""
@@ -237,3 +239,9 @@ class MatchSession:
         self._since = float("nan")
         for match in self._matches:
             match.stop()
+
+
+def _evenly(count: int, most: int) -> list[int]:
+    """Return up to `most` of `count` indices, evenly spaced, the first and the last among them."""
+    indices: list[int] = np.unique(np.linspace(0, count - 1, most).round().astype(int)).tolist()
+    return indices

@@ -194,7 +194,7 @@ class PuppetMatch:
 
         Args:
             tried: at least one pose that the surface tries.
-            poses: all poses of the rehearsal.
+            poses: poses of the whole way, which are placed only.
 
         Returns:
             The room that the puppet takes in them.

@@ -38,14 +38,14 @@ class Reach:
 def reach_of(driver: Driver, root: Array, around: Array, poses: Sequence[Pose]) -> Reach:
     """Return the room that a character takes in poses that are not all tried.
 
-    The targets of every pose are placed, which deforms no surface; what the surface reaches beyond
+    The targets of each pose are placed, which deforms no surface; what the surface reaches beyond
     them is known from the poses that were tried.
 
     Args:
         driver: moves the character, prepared; it is reset.
         root: (3,) [m] the character's root node at rest.
         around: (2, 3) [m] corners of what it fills in place, in the poses that were tried.
-        poses: all poses, in any order; at least one.
+        poses: poses of the whole way, in any order; at least one.
     """
     boxes, ways = np.empty((len(poses), 2, 3)), np.zeros((len(poses), 3))
     for number, pose in enumerate(poses):
