@@ -23,6 +23,7 @@ from devices.bridge.receiver import BridgeReceiver
 from devices.osc.vmc_decoder import VmcDecoder
 from replay.builtin import builtin_recording
 from runtime.characters.builtin import BUILTIN, builtin_character
+from runtime.characters.open_character import load_character
 from runtime.characters.proxy import proxy_of
 from runtime.driving.performer import Performer
 from runtime.puppet.deformable_surface import Elasticity
@@ -36,6 +37,7 @@ from solvers.deform.skinning import SkinnedSurface
 from solvers.kernels.cache import count_compiled, has_list, remove_unused, save_list
 from solvers.linear.block_factor import BlockFactor
 from solvers.linear.nested_dissection import dissect
+from solvers.retarget.two_bone_ik import two_bone_turns
 from solvers.squash_stretch import SquashStretchSolver
 from solvers.surface.heat_weights import skin_of_heat
 
@@ -135,6 +137,7 @@ def use_solvers() -> None:
         solver.restore(before)
     _factor_in_double()
     _skin(x, faces)
+    two_bone_turns(np.eye(3)[None], np.ones((1, 3)), np.ones((1, 3)))  # where a foot slides only
 
 
 def _skin(points: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
@@ -169,7 +172,7 @@ def _use_decoders_and_surfaces() -> None:
 
 def _perform() -> None:
     """Perform a few frames with every built-in character."""
-    characters = [builtin_character(name) for name in BUILTIN]
+    characters = [load_character(name) for name in BUILTIN]
     elastic = CharacterSettings(cartoon=1.0, volume_gain=1.5, stiffness=0.5)
     settings = ShowSettings(characters=(elastic, *[CharacterSettings()] * (len(characters) - 1)))
     with Show(play(builtin_recording(), every_frame=True), characters, settings) as show:

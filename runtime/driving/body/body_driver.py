@@ -14,7 +14,7 @@ from devices.bodies.rest_heading import rest_heading
 from devices.errors import InputError
 from runtime.driving.body.body_parts import BodyParts, body_parts
 from runtime.driving.body.footing import Footing, FootingState
-from runtime.driving.body.joint_turns import JointTurns
+from runtime.driving.body.joint_turns import JointTurns, about_vertical
 from runtime.driving.body.long_arms import LongArms
 from runtime.driving.body.path import Path
 from runtime.driving.body.upright import upright_at_rest, upright_in_poses
@@ -117,9 +117,20 @@ class BodyDriver:
         body = {joint for part in parts.parts for joint in part.source}
         body -= {joint for leg in parts.legs for joint in leg.source[2:]}
         self._footing = Footing(
-            performer, upright, skeleton.tree.positions, parts.legs, sorted(body)
+            performer,
+            upright,
+            skeleton.tree.positions,
+            parts.legs,
+            sorted(body),
+            rotate(about_vertical(self._facing), np.array([0.0, 0.0, 1.0])),
         )
-        self._long_arms = LongArms(skeleton.tree.positions, parts.arms, parts.legs)
+        self._long_arms = LongArms(
+            skeleton.tree.rerooted(plan.hips),
+            pairing.surface.rest,
+            skeleton.skin.nodes[:, 0],
+            parts.arms,
+            parts.legs,
+        )
         left = [np.cos(self._facing), 0.0, -np.sin(self._facing)]
         self._left = np.array(left)
         self._origin: Array | None = None
@@ -171,7 +182,9 @@ class BodyDriver:
         left = rotate(self._trunk[0], self._left)
         self._footing.turn_soles(joints, left, pose.time, given)
         pose_limbs(rig, joints, self._trunk, given, self._twists, rotations, positions)
-        if self._long_arms.raise_arms(positions, rotations, given):
+        if self._long_arms.raise_arms(
+            positions, rotations, given, self._ratio * self._footing.above
+        ):
             pose_limbs(rig, joints, self._trunk, given, self._twists, rotations, positions)
         path = self._path(pose, rest, heading)
         if self._footing.plant(

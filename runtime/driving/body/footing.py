@@ -22,6 +22,7 @@ Array = NDArray[np.float64]
 Place = Callable[[Array], Array]
 """Takes points (..., 3) [m] from one space to another."""
 
+_SHORT, _FOOT = 0.02, 0.25  # of the leg: a foot without length, and the length it is given
 _STILL = 1e-6  # [m] a foot that is off by less is in its place
 
 
@@ -43,6 +44,7 @@ class Footing:
         nodes: (K, 3) [m] the character's nodes at rest.
         legs: the legs that correspond.
         body: joints of trunk, arms and legs, which may rest on the floor too.
+        forward: (3,) where the character looks at rest.
     """
 
     def __init__(
@@ -52,6 +54,7 @@ class Footing:
         nodes: Array,
         legs: Sequence[Leg],
         body: Sequence[int],
+        forward: Array,
     ) -> None:
         rest = performer.rest_positions
         self._legs = legs
@@ -67,6 +70,8 @@ class Footing:
         self._contacts = FootContacts(rest[self._parts, 1], float(np.mean(theirs)) if legs else 1.0)
         self._lock = FootLock(np.array(lengths))
         ours = nodes[self._points[:, 1]] - nodes[self._points[:, 0]]
+        pointless = np.linalg.norm(ours, axis=1) < _SHORT * np.mean(lengths) if legs else slice(0)
+        ours[pointless] = _FOOT * float(np.mean(lengths or [1.0])) * forward
         standing = upright[self._parts[:, 1]] - upright[self._parts[:, 0]]
         ratio = float(np.mean(lengths)) / max(float(np.mean(theirs)), 1e-9) if legs else 1.0
         standing = np.where(self._has_toes[:, None], standing, ours / ratio)
@@ -139,6 +144,11 @@ class Footing:
             own = rotations[self._joints[:, bone]]
             given[self._segments[:, bone]] = multiply(turns[:, bone], own)
         return True
+
+    @property
+    def above(self) -> float:
+        """How far [m] the performer's lower foot is above where it stands."""
+        return float(self._contacts.heights.min()) if len(self._legs) else 0.0
 
     def clearance(self, pose: Pose) -> float:
         """How far the performer is above the floor [m]; 0 for one whose feet are not known."""

@@ -1,6 +1,7 @@
-"""Keeps wings and long arms, which would reach below the floor, lying on it.
+"""Keeps arms and wings that would reach below the floor lying on it.
 
-A bird that let its wings hang as a performer lets the arms hang would stand on them as on stilts.
+A bird that let its wings hang as a performer lets the arms hang would stand on them as on stilts,
+and a robot with long arms could not squat.
 """
 
 from __future__ import annotations
@@ -13,40 +14,57 @@ from numpy.typing import NDArray
 from devices.bodies.body_plan import Chain
 from runtime.driving.body.body_parts import Arm, Leg
 from solvers.skeleton.quaternions import multiply
+from solvers.skeleton.tree import Tree
 
 Array = NDArray[np.float64]
 
-_LONG = 1.1  # of the shoulder height: a shorter arm is let be, as it points right
-_ABOVE = 0.02  # of the height: how far above the floor the nodes stay, for what is around them
 _ASIDE = 0.3  # of an arm's length: an arm this far below the floor is laid out to its side
+_THICK = 90.0  # percentile of the distances from the surface of a hand to its bones
 
 
 class LongArms:
-    """The arms of a character that reach the floor.
+    """The arms of a character, which may reach the floor while its body is low.
 
     Args:
-        nodes: (K, 3) [m] at rest.
+        tree: the character's nodes at rest.
+        vertices: (C, 3) [m] of the surface at rest.
+        owner: (C,) the node that each vertex follows most.
         arms: those that are driven absolutely.
         legs: what the body stands on.
     """
 
-    def __init__(self, nodes: Array, arms: Sequence[Arm], legs: Sequence[Leg]) -> None:
-        self._rest = nodes
+    def __init__(
+        self,
+        tree: Tree,
+        vertices: Array,
+        owner: NDArray[np.int64],
+        arms: Sequence[Arm],
+        legs: Sequence[Leg],
+    ) -> None:
+        self._rest = tree.positions
         self._soles = np.array([leg.target[2:] for leg in legs], dtype=np.int64).ravel()
-        self._margin = _ABOVE * float(np.ptp(nodes[:, 1]))
-        self._arms = [arm for arm in arms if legs and self._is_long(arm.target)]
+        self._arms = list(arms) if legs else []
+        self._nodes = [list(tree.subtree(arm.target[0])[1:]) for arm in self._arms]
+        self._radii = [self._radius(arm.target, vertices, owner) for arm in self._arms]
 
-    def _is_long(self, arm: Chain) -> bool:
-        length = np.linalg.norm(np.diff(self._rest[list(arm)], axis=0), axis=1).sum()
-        return bool(length > _LONG * (self._rest[arm[0], 1] - self._rest[:, 1].min()))
+    def _radius(self, arm: Chain, vertices: Array, owner: NDArray[np.int64]) -> float:
+        """How far [m] the surface of a hand is from its bones."""
+        hand = vertices[np.isin(owner, arm[-2:])]
+        if not len(hand):
+            return 0.0
+        a, b = self._rest[arm[-2]], self._rest[arm[-1]]
+        along = (hand - a) @ (b - a) / max(float((b - a) @ (b - a)), 1e-12)
+        gaps = hand - a - np.clip(along, 0.0, 1.0)[:, None] * (b - a)
+        return float(np.percentile(np.linalg.norm(gaps, axis=1), _THICK))
 
-    def raise_arms(self, positions: Array, rotations: Array, given: Array) -> bool:
+    def raise_arms(self, positions: Array, rotations: Array, given: Array, above: float) -> bool:
         """Put the rotations that keep the arms above the floor into `given` (S, 4).
 
         Args:
             positions: (K, 3) [m] of the posed nodes.
             rotations: (K, 4) of the posed nodes.
             given: (S, 4) rotations of the segments, is changed.
+            above: [m] how far the feet are above where they stand.
 
         Returns:
             Whether any arm is too low.
@@ -54,14 +72,14 @@ class LongArms:
         if not self._arms:
             return False
         soles = positions[self._soles, 1] - self._rest[self._soles, 1]
-        floor = float(soles.min()) + float(self._rest[:, 1].min()) + self._margin
-        middle = positions[[arm.target[0] for arm in self._arms]].mean(axis=0)
+        floor = float(soles.min()) + float(self._rest[:, 1].min()) - max(above, 0.0)
+        middle = positions[self._soles].mean(axis=0)
         raised = False
-        for arm in self._arms:
+        for arm, nodes, radius in zip(self._arms, self._nodes, self._radii, strict=True):
             shoulder = positions[arm.target[0]]
-            ways = positions[list(arm.target[1:])] - shoulder
+            ways = positions[nodes] - shoulder
             low = int(np.argmin(ways[:, 1]))
-            turn = _raised(ways[low], shoulder[1] - floor, shoulder - middle)
+            turn = _raised(ways[low], shoulder[1] - floor - radius, shoulder - middle)
             if turn is None:
                 continue
             raised = True

@@ -66,9 +66,13 @@ class RigBuilder:
     def add_leg(self, theirs: Limb, ours: Limb, drive: str) -> tuple[int, int, int]:
         """Let a leg follow a leg; return its segments as of `Leg`."""
         last, foot = self._follow(theirs, ours, drive, self._upright), -1
+        ends = theirs.end or (theirs.lower or theirs.upper)[-1:]
         if ours.end:
-            ends = theirs.end or (theirs.lower or theirs.upper)[-1:]
             foot = self._add(ours.end, ends[0], ends[-1])
+        elif ours.lower:  # a foot of one joint is a foot too
+            ankle = ours.lower[-1]
+            foot = self._add((ankle, ankle), ends[0], ends[-1])
+        if foot >= 0:
             self._is_free[foot] = True
             self._along[foot] = _direction(self._upright, ends)
         return last - 1, last, foot

@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from runtime.driving.body.body_parts import Arm, Leg
 from runtime.driving.body.long_arms import LongArms
+from solvers.skeleton.tree import Tree
 
 # hips, knee, ankle; shoulder, elbow, tip of a wing that is longer than the shoulder is high
 NODES = np.array(
@@ -22,8 +23,23 @@ NODES = np.array(
         [1.6, 0.8, 0.0],
     ]
 )
+PARENTS = np.array([-1, 0, 1, 0, 3, 4])
 LEG = Leg((0, 1, 2, 2), (0, 1, 2, 2), (2, 3, -1))
 WING = Arm((3, 4, 5), (0, 1), (3, 4))
+
+
+def lying(arm: Arm = WING) -> LongArms:
+    """A wing whose surface is 0.016 around its bones."""
+    offsets = np.array([[0.0, 0.016, 0.0], [0.0, -0.016, 0.0]])
+    vertices = NODES[arm.target[-2]] + offsets
+    owner = np.full(2, arm.target[-2])
+    return LongArms(
+        Tree(PARENTS[: arm.target[-1] + 1], NODES[: arm.target[-1] + 1]),
+        vertices,
+        owner,
+        [arm],
+        [LEG],
+    )
 
 
 def hung(turn: Rotation) -> tuple[np.ndarray, np.ndarray]:
@@ -40,7 +56,7 @@ def test_a_wing_stays_above_the_floor_and_points_as_before_where_it_is(
 ) -> None:
     positions, rotations = hung(Rotation.from_euler("zy", [-about_z, about_y]))
     turns = np.zeros((4, 4))
-    raised = LongArms(NODES, [WING], [LEG]).raise_arms(positions, rotations, turns)
+    raised = lying().raise_arms(positions, rotations, turns, 0.0)
     assert raised == (positions[5, 1] < 0.016)
     if raised:
         tip = positions[3] + Rotation.from_quat(turns[0]).apply(NODES[5] - NODES[3])
@@ -50,14 +66,20 @@ def test_a_wing_stays_above_the_floor_and_points_as_before_where_it_is(
 
 def test_it_begins_where_the_floor_begins() -> None:
     edge = np.arcsin((0.8 - 0.016) / 1.4)
-    wing = LongArms(NODES, [WING], [LEG])
+    wing = lying()
     turns = np.zeros((4, 4))
     below = Rotation.from_euler("z", -(edge + 1e-6))
-    assert wing.raise_arms(*hung(below), turns)
+    assert wing.raise_arms(*hung(below), turns, 0.0)
     assert (Rotation.from_quat(turns[0]) * below.inv()).magnitude() < 1e-4
 
 
 def test_an_arm_that_does_not_reach_the_floor_is_let_be() -> None:
     short = Arm((3, 4), (0,), (3,))
     positions, rotations = hung(Rotation.from_euler("z", -np.pi / 2.0))
-    assert not LongArms(NODES, [short], [LEG]).raise_arms(positions, rotations, np.zeros((4, 4)))
+    assert not lying(short).raise_arms(positions, rotations, np.zeros((4, 4)), 0.0)
+
+
+def test_hands_may_be_below_feet_that_are_in_the_air() -> None:
+    positions, rotations = hung(Rotation.from_euler("z", -np.pi / 2.0))
+    assert lying().raise_arms(positions, rotations, np.zeros((4, 4)), 0.3)
+    assert not lying().raise_arms(positions, rotations, np.zeros((4, 4)), 0.7)
