@@ -26,6 +26,8 @@ class PerformedFrame:
             none.
         poses: newest pose of each performer of the show, in the order of their slots; None for a
             performer who was not seen yet.
+        weights: (T,) of the character's morph targets, which the vertices contain; None where it
+            has none.
         picture: (H, W, 4) uint8 sRGB with straight alpha, top row first, or None when no output
             needs one for this frame.
     """
@@ -36,6 +38,7 @@ class PerformedFrame:
     nodes: PosedNodes | None
     poses: tuple[Pose | None, ...] = ()
     picture: NDArray[np.uint8] | None = None
+    weights: NDArray[np.float64] | None = None
 
     def nodes_for(self, what: str) -> PosedNodes:
         """Return the posed nodes, for an output that requires them.

@@ -33,10 +33,12 @@ class Motion:
     Attributes:
         vertices: (N, 3) [m]; overwritten two motions later.
         nodes: its posed nodes; None if its driver poses none.
+        weights: (T,) of its morph targets, which the vertices contain; None if it has none.
     """
 
     vertices: Array
     nodes: PosedNodes | None
+    weights: Array | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -210,7 +212,7 @@ class Puppet:
         self._stance = put_on_stage(vertices, targets.placement, self._root, standing)
         self.face.move(standing)
         nodes = None if targets.nodes is None else self._stance.place_nodes(targets.nodes)
-        return Motion(standing, nodes)
+        return Motion(standing, nodes, self.face.weights if len(self.face.weights) else None)
 
     def _vertices(self, shape: HandleTargets | SkinnedTargets | Array, iterations: int) -> Array:
         """The character's vertices (N, 3) [m] before the placement."""

@@ -242,6 +242,7 @@ class FrameLoop:
                     nodes=motion.nodes,
                     poses=poses,
                     picture=picture,
+                    weights=motion.weights,
                 )
                 for output in own:
                     output.write(performed)

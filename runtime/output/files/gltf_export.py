@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from runtime.characters.character import Character, Material, Surface
 from runtime.output.files.glb import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, GlbBuilder
+from runtime.output.files.morph_export import MorphExport
 from runtime.output.files.node_motion import NodeMotion, NodeMotionRecorder
 from runtime.output.files.whole_file import check_suffix, check_writable
 from runtime.output.output import PerformedFrame
@@ -48,6 +49,7 @@ class GltfExport:
     The animation moves the skeleton's nodes, which every game engine plays. The surface follows by
     linear blend skinning with four nodes per vertex, which approximates the performed surface. The
     weights come from the character's file, or are fitted to up to 64 frames of the show.
+    Morph targets that the show moved are written with their weights, by the same way as the nodes.
     `deviation` measures the error; the file has it too, in the mesh's ``extras``. The point cache
     and the USD export hold the exact surface.
 
@@ -71,6 +73,7 @@ class GltfExport:
         check_writable(path)
         self._path, self._character = path, character
         self._motion = NodeMotionRecorder(len(character.skeleton.names))
+        self._morphs = MorphExport(character)
         self._samples: list[PerformedFrame] = []
         self._stride = 1  # frames per kept sample
         self._written = 0
@@ -79,7 +82,8 @@ class GltfExport:
 
     def write(self, frame: PerformedFrame) -> None:
         """Store one frame."""
-        self._motion.add(frame)
+        if self._motion.add(frame):
+            self._morphs.add(frame)
         if self._written % self._stride == 0:
             self._samples.append(replace(frame, vertices=frame.vertices.copy(), picture=None))
             if len(self._samples) > _SAMPLES:
@@ -99,8 +103,8 @@ class GltfExport:
         skin = self._fitted_skin()
         builder = GlbBuilder()
         _add_skeleton(builder, self._character)
-        _add_mesh(builder, self._character, skin, self.deviation)
-        _add_animation(builder, self._character, self._motion.motion())
+        _add_mesh(builder, self._character, skin, self.deviation, self._morphs)
+        _add_animation(builder, self._character, self._motion.motion(), self._morphs)
         builder.save(self._path)
 
     def _fitted_skin(self) -> Skin:
@@ -115,9 +119,10 @@ class GltfExport:
         if self._character.weights is not None:
             skin = skin_of_weights(self._character.weights)
         else:
-            skin = fit_skin(vertices, tree, skin_of_distances(vertices, tree), samples)
+            prior = skin_of_distances(vertices, tree)
+            skin = fit_skin(vertices, tree, prior, self._morphs.undone(samples, frames, prior))
         if frames:
-            off = deviations(vertices, tree, skin, samples)
+            off = deviations(vertices, tree, skin, self._morphs.undone(samples, frames, skin))
             self.deviation = SkinDeviation(float(np.sqrt(np.mean(off**2))), float(off.max()))
         return skin
 
@@ -156,11 +161,15 @@ def _add_skeleton(builder: GlbBuilder, character: Character) -> None:
 
 
 def _add_mesh(
-    builder: GlbBuilder, character: Character, skin: Skin, deviation: SkinDeviation | None
+    builder: GlbBuilder,
+    character: Character,
+    skin: Skin,
+    deviation: SkinDeviation | None,
+    morphs: MorphExport,
 ) -> None:
     """Add one primitive for each material in use; all share the same vertices."""
     surface = character.surface
-    attributes = _attributes(builder, character, skin)
+    attributes, targets = _attributes(builder, character, skin), morphs.targets(builder)
     primitives: list[dict[str, Any]] = []
     materials: list[dict[str, Any]] = []
     for material in np.unique(surface.face_material):
@@ -171,14 +180,21 @@ def _add_mesh(
                 "indices": builder.add_array(corners, target=ELEMENT_ARRAY_BUFFER),
                 "material": len(materials),
             }
+            | ({"targets": targets} if targets else {})
         )
         materials.append(_material(builder, surface, surface.materials[material]))
     mesh: dict[str, Any] = {"name": character.name, "primitives": primitives}
+    extras: dict[str, Any] = {}
     if deviation is not None:
-        mesh["extras"] = {
+        extras = {
             "skinDeviationRms": deviation.rms,
             "skinDeviationGreatest": deviation.greatest,
         }
+    if targets:
+        mesh["weights"] = [0.0] * len(targets)
+        extras["targetNames"] = morphs.names
+    if extras:
+        mesh["extras"] = extras
     builder.document |= {"meshes": [mesh], "materials": materials}
 
 
@@ -225,7 +241,9 @@ def _material(builder: GlbBuilder, surface: Surface, material: Material) -> dict
     return described | ({"alphaMode": "BLEND"} if color[3] < 1 else {})
 
 
-def _add_animation(builder: GlbBuilder, character: Character, motion: NodeMotion) -> None:
+def _add_animation(
+    builder: GlbBuilder, character: Character, motion: NodeMotion, morphs: MorphExport
+) -> None:
     """Add channels only for motion: a bone that keeps its length has no translation channel."""
     if len(motion.times) == 0:
         return
@@ -237,7 +255,7 @@ def _add_animation(builder: GlbBuilder, character: Character, motion: NodeMotion
     channels: list[dict[str, Any]] = []
     times = builder.add_array(motion.times.astype(np.float32), bounds=True)
 
-    def add(node: int, path: str, values: NDArray[np.float64]) -> None:
+    def add(node: int, path: str, values: NDArray[np.floating]) -> None:
         output = builder.add_array(values.astype(np.float32))
         channels.append({"sampler": len(samplers), "target": {"node": node, "path": path}})
         samplers.append({"input": times, "output": output, "interpolation": "LINEAR"})
@@ -248,6 +266,9 @@ def _add_animation(builder: GlbBuilder, character: Character, motion: NodeMotion
             add(node, "translation", translations[:, node])
         if np.abs(rotations[:, node, :3]).max() > _STILL:
             add(node, "rotation", rotations[:, node])
+    weights = morphs.weights
+    if weights.size:
+        add(len(rest), "weights", weights.ravel())
     if channels:
         animation = {"name": "performance", "samplers": samplers, "channels": channels}
         builder.document["animations"] = [animation]

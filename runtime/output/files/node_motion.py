@@ -56,16 +56,17 @@ class NodeMotionRecorder:
         self._positions: list[NDArray[np.float32]] = []
         self._rotations: list[NDArray[np.float32]] = []
 
-    def add(self, frame: PerformedFrame) -> None:
-        """Store one frame, unless its time equals that of the frame before."""
+    def add(self, frame: PerformedFrame) -> bool:
+        """Store one frame, unless its time equals that of the frame before; return whether."""
         if self._times and np.float32(frame.time - self._times[0]) <= np.float32(
             self._times[-1] - self._times[0]
         ):
-            return  # files store times as float32, which must increase
+            return False  # files store times as float32, which must increase
         nodes = frame.nodes_for("an exported skeleton")
         self._times.append(frame.time)
         self._positions.append(nodes.positions.astype(np.float32))
         self._rotations.append(nodes.rotations.astype(np.float32))
+        return True
 
     def motion(self) -> NodeMotion:
         """Return everything collected so far."""

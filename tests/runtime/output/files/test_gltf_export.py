@@ -17,9 +17,11 @@ from scipy.spatial.transform import Rotation, Slerp
 
 from devices.errors import InputError
 from runtime.characters.character import Character
+from runtime.characters.morphs import Morphs
 from runtime.driving.targets import PosedNodes
 from runtime.output.files.gltf_export import GltfExport
 from runtime.output.output import PerformedFrame
+from solvers.deform.morph_targets import MorphTargets
 from tests.runtime.tentacle import HEIGHT, NODES, make_show, make_tentacle
 
 
@@ -54,6 +56,8 @@ class Player:
                  for node in self.gltf.nodes]  # fmt: skip
         for animation in self.gltf.animations:
             for channel in animation.channels:
+                if channel.target.path == "weights":
+                    continue
                 sampler = animation.samplers[channel.sampler]
                 times = self.array(sampler.input)[:, 0].astype(float)
                 values = self.array(sampler.output).astype(float)
@@ -78,16 +82,32 @@ class Player:
             place(root, np.eye(4))
         return matrices
 
+    def morph_weights(self, time: float) -> NDArray[np.float64]:
+        """The weights of the mesh's morph targets at `time` [s]."""
+        for animation in self.gltf.animations:
+            for channel in animation.channels:
+                if channel.target.path == "weights":
+                    assert self.gltf.nodes[channel.target.node].mesh == 0
+                    sampler = animation.samplers[channel.sampler]
+                    times = self.array(sampler.input)[:, 0].astype(float)
+                    rows = self.array(sampler.output).astype(float).reshape(len(times), -1)
+                    return np.array([np.interp(time, times, row) for row in rows.T])
+        return np.array(self.gltf.meshes[0].weights or [])
+
     def vertices(self, time: float) -> NDArray[np.float64]:
-        """Skinned file vertices (M, 3) at `time` [s]."""
-        attributes = self.gltf.meshes[0].primitives[0].attributes
+        """Morphed and skinned file vertices (M, 3) at `time` [s]."""
+        primitive = self.gltf.meshes[0].primitives[0]
+        attributes = primitive.attributes
+        positions = self.array(attributes.POSITION).astype(float)
+        for weight, target in zip(self.morph_weights(time), primitive.targets or [], strict=True):
+            positions += weight * self.array(target["POSITION"])
         skin = self.gltf.skins[0]
         bind = self.array(skin.inverseBindMatrices).reshape(-1, 4, 4).transpose(0, 2, 1)
         joints = self.node_matrices(time)[skin.joints] @ bind
         nodes = self.array(attributes.JOINTS_0)
         weights = self.array(attributes.WEIGHTS_0).astype(float)
         np.testing.assert_allclose(weights.sum(axis=1), 1, atol=1e-6)
-        rest = np.c_[self.array(attributes.POSITION), np.ones(len(nodes))]
+        rest = np.c_[positions, np.ones(len(nodes))]
         return np.einsum("nc,ncij,nj->ni", weights, joints[nodes], rest)[:, :3]
 
 
@@ -104,6 +124,45 @@ def test_the_skinned_surface_follows_the_performed_one(tmp_path: Path) -> None:
     assert output.deviation.greatest < 3e-3 * HEIGHT
     extras = player.gltf.meshes[0].extras
     assert extras["skinDeviationRms"] == output.deviation.rms
+
+
+def expressive(character: Character) -> Character:
+    """The character with a target that is never moved, and one that widens its upper half."""
+    upper = np.flatnonzero(character.vertices[:, 1] > 0.5 * HEIGHT)
+    wider = 0.5 * character.vertices[upper] * [1.0, 0.0, 1.0]
+    targets = MorphTargets.of([(upper, -wider), (upper, wider)])
+    return replace(character, morphs=Morphs.of(targets, ["thin", "wide"]))
+
+
+def test_morphs_are_written_with_their_weights(tmp_path: Path) -> None:
+    character = expressive(make_tentacle())
+    targets = character.morphs.targets
+    own = slice(targets.starts[1], targets.starts[2])
+    show = []
+    for index in range(40):
+        weight = 0.5 - 0.5 * np.cos(0.3 * index)
+        wide = character.vertices.copy()
+        wide[targets.vertices[own]] += weight * targets.deltas[own]
+        performed = make_show(replace(character, vertices=wide))[index]
+        show.append(replace(performed, weights=np.array([0.0, weight])))
+    output = export(tmp_path / "b.glb", character, show)
+    player = Player(tmp_path / "b.glb")
+    mesh = player.gltf.meshes[0]
+    assert mesh.extras["targetNames"] == ["wide"], "what never moves is not written"
+    assert mesh.weights == [0.0]
+    assert all(len(primitive.targets) == 1 for primitive in mesh.primitives)
+    for frame in (show[0], show[11], show[17], show[-1]):
+        expected = frame.vertices[character.surface.vertex]
+        np.testing.assert_allclose(player.vertices(frame.time), expected, atol=0.004 * HEIGHT)
+    assert output.deviation.rms < 1e-3 * HEIGHT
+
+
+def test_a_show_without_a_face_gives_the_same_file(tmp_path: Path) -> None:
+    character = make_tentacle()
+    export(tmp_path / "a.glb", character, make_show(character, frames=5))
+    still = [replace(f, weights=np.zeros(2)) for f in make_show(character, frames=5)]
+    export(tmp_path / "b.glb", expressive(character), still)
+    assert (tmp_path / "a.glb").read_bytes() == (tmp_path / "b.glb").read_bytes()
 
 
 def test_the_nodes_are_exactly_where_they_were(tmp_path: Path) -> None:
