@@ -216,7 +216,8 @@ class Face:
 
     def restore(self, weights: Array) -> None:
         """Go back to the weights (T,) of a snapshot."""
-        self.weights, self._blends = weights.copy(), None
+        self.weights = weights.copy()
+        self._blends = {}  # of no pose: the next one counts, whatever it holds
 
     def _news(self) -> str:
         if self._mixer is None:

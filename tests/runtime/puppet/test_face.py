@@ -173,5 +173,7 @@ def test_a_puppet_follows_the_face_of_its_performer_and_states_hold_it() -> None
     np.testing.assert_allclose(puppet.deform().vertices, plain, atol=1e-9)
     puppet.restore(state)
     np.testing.assert_allclose(puppet.deform().vertices, opened, atol=1e-9)
+    puppet.follow(performer.follow(frame(pose(), 0.2)))
+    np.testing.assert_allclose(puppet.deform().vertices, plain, atol=1e-9)
     puppet.follow(performer.follow(open_mouth))
     np.testing.assert_allclose(puppet.deform().vertices, opened, atol=1e-9)
