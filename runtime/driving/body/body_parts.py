@@ -125,7 +125,7 @@ def body_parts(
     chosen = frozenset(joints)
     for side in SIDES:
         theirs, ours = source.legs.get(side), plan.legs.get(side)
-        if theirs and ours and chosen.issuperset(theirs.upper):
+        if theirs and ours and chosen.issuperset((theirs.upper[0], theirs.upper[-1])):
             drive = rig.drive_of(plan.legs.values(), least_upright)
             segments = rig.add_leg(theirs, ours, drive)
             parts.append(Part(f"{side} leg", _joined(theirs), _joined(ours), drive))
@@ -133,7 +133,7 @@ def body_parts(
                 legs.append(Leg(_bends(theirs), _bends(ours), segments))
     for side in SIDES:
         theirs, ours = source.arms.get(side), plan.arms.get(side)
-        if theirs and ours and chosen.issuperset(theirs.upper):
+        if theirs and ours and chosen.issuperset((theirs.upper[0], theirs.upper[-1])):
             first = rig.segments
             drive = rig.drive_of(plan.arms.values(), least_upright)
             palms = _knuckles(source, side), _knuckles(plan, side)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from devices.bodies.plan_by_names import plan_by_names
 from devices.errors import InputError
 from devices.skeleton import Skeleton, SkeletonFrame
+from replay.formats import read_recording
 from runtime.characters.character import Character
 from runtime.driving.body.body_driver import BodyDriver
 from runtime.driving.drivers import best_driver
@@ -236,6 +238,23 @@ def test_a_mapping_by_hand_beats_the_anatomy() -> None:
     assert isinstance(best_driver(pairing), BodyDriver)
     by_hand = replace(pairing, by_hand=Mapping(ARMS))
     assert isinstance(best_driver(by_hand), PolylineDriver)
+
+
+def test_bones_that_divide_an_upper_arm_are_not_missed(shared: Path) -> None:
+    recording = read_recording(shared / "bvh/makehuman_tpose_1frame.bvh")
+    performer = Performer(recording.skeleton)
+    puppet = Puppet(body())
+    driver = BodyDriver(
+        Pairing(
+            recording.skeleton,
+            tuple(performer.joints),
+            puppet.character,
+            puppet.bound_skeleton,
+            puppet.surface,
+        )
+    )
+    names = {part.name for part in driver.parts}
+    assert names >= {"left arm", "right arm", "left leg", "right leg"}
 
 
 def test_only_the_chosen_part_of_the_performer_drives() -> None:
