@@ -209,7 +209,6 @@ class Puppet:
         standing = self._standing[0]
         placement = self.travel.of(targets.placement)
         self._stance = put_on_stage(vertices, placement, self._root, standing)
-        self._stance = put_on_stage(vertices, targets.placement, self._root, standing)
         self.face.move(standing)
         nodes = None if targets.nodes is None else self._stance.place_nodes(targets.nodes)
         return Motion(standing, nodes, self.face.weights if len(self.face.weights) else None)
