@@ -14,8 +14,10 @@ STANDS = 0.02  # a foot no higher above the place where it stands counts as stan
 JUMPS = 0.06  # from here on the clearance is the whole height of a jump
 FLESH = 0.05  # around the joints of trunk, arms and legs, which lie, sit or kneel on it
 
+TUCK = 2.0  # times the rise of the trunk: what legs that are drawn up add to a jump
 
-def clearance(feet: Array, joints: Array, floor: float, stature: float) -> float:
+
+def clearance(feet: Array, joints: Array, floor: float, stature: float, rise: float) -> float:
     """Return how far a performer is above the floor [m]; 0 while they stand, sit, kneel or lie.
 
     It rises smoothly between the two limits above, and never jumps where the heights do not.
@@ -27,17 +29,20 @@ def clearance(feet: Array, joints: Array, floor: float, stature: float) -> float
             of the feet, and none that stays on the floor while the body jumps.
         floor: [m] the height of the floor; see `FootContacts.floors`.
         stature: [m] the height of the performer, standing.
+        rise: [m] how much higher the trunk is than when a foot stood last. Feet that a camera sees
+            higher than they are, and those of a body whose hips it keeps in place, make no jump.
     """
-    return _clearance(feet, joints, floor, stature)
+    return _clearance(feet, joints, floor, stature, rise)
 
 
 @kernel
-def _clearance(feet: Array, joints: Array, floor: float, stature: float) -> float:
+def _clearance(feet: Array, joints: Array, floor: float, stature: float, rise: float) -> float:
     above = np.inf
     for foot in range(len(feet)):
         above = min(above, feet[foot, 0], feet[foot, 1])
     for joint in range(len(joints)):
         above = min(above, joints[joint, 1] - floor - FLESH * stature)
+    above = min(above, TUCK * rise)
     share = (above / stature - STANDS) / (JUMPS - STANDS)
     share = min(max(share, 0.0), 1.0)
     return max(above, 0.0) * share * share * (3.0 - 2.0 * share)

@@ -122,6 +122,7 @@ class BodyDriver:
             skeleton.tree.positions,
             parts.legs,
             sorted(body),
+            parts.trunk,
             rotate(about_vertical(self._facing), np.array([0.0, 0.0, 1.0])),
         )
         self._long_arms = LongArms(

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from devices.skeleton import Skeleton
 from runtime.driving.body.body_parts import Leg
 from runtime.driving.performer import Pose
-from solvers.retarget.clearance import clearance
+from solvers.retarget.clearance import STANDS, clearance
 from solvers.retarget.foot_contacts import FootContacts, FootContactsState
 from solvers.retarget.foot_lock import FootLock, FootLockState
 from solvers.retarget.sole_pitch import SolePitch, SolePitchState
+from solvers.retarget.trunk_turns import TrunkJoints
 from solvers.retarget.two_bone_ik import two_bone_turns
 from solvers.skeleton.quaternions import multiply
 
@@ -28,11 +29,17 @@ _STILL = 1e-6  # [m] a foot that is off by less is in its place
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FootingState:
-    """The states of the parts of a `Footing` between two frames."""
+    """The states of the parts of a `Footing` between two frames.
+
+    Attributes:
+        contacts, lock, soles: of the parts.
+        stood: (2,) [m] heights of hips and shoulders when a foot stood last; NaN before.
+    """
 
     contacts: FootContactsState
     lock: FootLockState
     soles: SolePitchState
+    stood: Array
 
 
 class Footing:
@@ -44,6 +51,7 @@ class Footing:
         nodes: (K, 3) [m] the character's nodes at rest.
         legs: the legs that correspond.
         body: joints of trunk, arms and legs, which may rest on the floor too.
+        trunk: joints that show how high the trunk is.
         forward: (3,) where the character looks at rest.
     """
 
@@ -54,11 +62,16 @@ class Footing:
         nodes: Array,
         legs: Sequence[Leg],
         body: Sequence[int],
+        trunk: TrunkJoints,
         forward: Array,
     ) -> None:
         rest = performer.rest_positions
         self._legs = legs
         self._body = np.array(body, dtype=np.int64)
+        hips = np.array([leg.source[0] for leg in legs], dtype=np.int64)
+        shoulders = trunk.shoulders[trunk.shoulders >= 0]
+        self._heights_of = hips, shoulders if len(shoulders) else hips
+        self._stood = np.full(2, np.nan)
         self._parts = np.array([leg.source[2:] for leg in legs], dtype=np.int64).reshape(-1, 2)
         self._has_toes = np.array([leg.source[2] != leg.source[3] for leg in legs], dtype=np.bool_)
         self._joints = np.array([leg.target[:3] for leg in legs], dtype=np.int64).reshape(-1, 3)
@@ -154,19 +167,27 @@ class Footing:
         """How far the performer is above the floor [m]; 0 for one whose feet are not known."""
         if not len(self._legs):
             return 0.0
-        floor = float(self._contacts.floors.min())
-        return clearance(self._contacts.heights, pose.seen[self._body], floor, self._stature)
+        heights, floor = self._contacts.heights, float(self._contacts.floors.min())
+        trunk = np.array([pose.seen[joints, 1].mean() for joints in self._heights_of])
+        if heights.min() <= STANDS * self._stature or np.isnan(self._stood).any():
+            self._stood = trunk
+        rise = float((trunk - self._stood).min())
+        return clearance(heights, pose.seen[self._body], floor, self._stature, rise)
 
     def reset(self) -> None:
         """Forget the frames before."""
         self._contacts.reset()
         self._lock.reset()
         self._soles.reset()
+        self._stood = np.full(2, np.nan)
 
     def snapshot(self) -> FootingState:
         """Return what the next frame depends on."""
         return FootingState(
-            self._contacts.snapshot(), self._lock.snapshot(), self._soles.snapshot()
+            self._contacts.snapshot(),
+            self._lock.snapshot(),
+            self._soles.snapshot(),
+            self._stood,
         )
 
     def restore(self, state: FootingState) -> None:
@@ -174,6 +195,7 @@ class Footing:
         self._contacts.restore(state.contacts)
         self._lock.restore(state.lock)
         self._soles.restore(state.soles)
+        self._stood = state.stood
 
 
 def _length(points: Array, chain: tuple[int, ...]) -> float:

@@ -190,6 +190,18 @@ def test_a_jump_leaves_the_floor_and_comes_back(upright: BodyDriver) -> None:
     assert ankles[-1] == pytest.approx(ankles[0], abs=1e-3)
 
 
+def test_who_squats_before_a_camera_that_keeps_the_hips_in_place_does_not_fly(
+    upright: BodyDriver,
+) -> None:
+    poses = [squatting(share) for share in np.linspace(0.0, 1.0, 20)]
+    for positions in poses:
+        positions[:, 1] -= positions[0, 1] - BODY.rest_positions[0, 1]
+    assert poses[-1][BODY.index("AnkleLeft"), 1] > 0.2
+    nodes = follow(upright, *poses)
+    ankles = np.array([part.positions[node("ankle.L"), 1] for part in nodes])
+    assert ankles.max() < 0.12, "as far as the brick of a shin tilts"
+
+
 def test_the_head_follows_the_rotation_of_the_stream(upright: BodyDriver) -> None:
     performer = Performer(BODY)
     driver = upright
