@@ -22,6 +22,7 @@ from runtime.characters.builtin import builtin_character
 from runtime.characters.character import Character
 from runtime.characters.proxy import DENSE, PROXY, Proxy, proxy_of
 from runtime.show.open_stream import play
+from runtime.show.settings import MatchSettings, ShowSettings
 from runtime.show.show import Show
 from solvers.arap import ArapSolver
 from solvers.surface.decimation import decimate
@@ -38,6 +39,8 @@ MOST_SETTLED = 50_000  # the largest number of vertices for which it is computed
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 Figures = dict[str, float]
+
+RINGS = ShowSettings(match=MatchSettings(driver="relative"))  # a show whose surface has handles
 
 
 def run(sizes: Sequence[int] = SIZES, frames: int = FRAMES) -> dict[str, object]:
@@ -82,7 +85,13 @@ def dense_character(count: int) -> Character:
     if len(vertices) > 1.02 * count:
         thinned = decimate(vertices, faces, count)
         vertices, faces = vertices[thinned.kept], thinned.faces
-    return replace(character, vertices=np.ascontiguousarray(vertices), faces=faces, weights=None)
+    return replace(
+        character,
+        vertices=np.ascontiguousarray(vertices),
+        faces=faces,
+        weights=None,
+        morphs=None,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,9 +160,11 @@ def measure(
 def _perform(character: Character, proxy: Proxy, recording: Recording, frames: int) -> _Handles:
     """Perform with a puppet of the proxy and return its handles."""
     weights = None if character.weights is None else character.weights[proxy.kept]
-    coarse = replace(character, vertices=proxy.vertices, faces=proxy.faces, weights=weights)
+    coarse = replace(
+        character, vertices=proxy.vertices, faces=proxy.faces, weights=weights, morphs=None
+    )
     targets: list[Floats] = []
-    with Show(play(_thinned(recording), every_frame=True), [coarse]) as show:
+    with Show(play(_thinned(recording), every_frame=True), [coarse], RINGS) as show:
         binding = show.puppets[0].bound_skeleton.binding
         while len(targets) < frames and show.tick():
             targets.append(show.vertices[0][binding.handles])

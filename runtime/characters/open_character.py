@@ -52,16 +52,18 @@ def _recognised(path: Path) -> Character:
     A mesh that shows its back is turned about; rig files say themselves which way is forward.
     """
     character = split_parallel_bones(read_character(path))
-    if character.weights is not None or is_sheet(character.vertices, character.faces):
-        return _planned(character)
+    planned = _planned(character)
+    is_rig = planned.plan is not None or character.weights is not None
+    if is_rig or is_sheet(character.vertices, character.faces):
+        return planned
     character = with_body_by_shape(character)
     return facing_the_audience(character) if path.suffix.lower() in MESH_SUFFIXES else character
 
 
 def _planned(character: Character) -> Character:
     """The character with the plan of its body, where one is declared or recognised."""
-    if is_sheet(character.vertices, character.faces):
-        return character
     skeleton = character.skeleton
-    declared = plan_by_declaration(skeleton, character.humanoid)
-    return replace(character, plan=declared or plan_by_names(skeleton))
+    plan = plan_by_declaration(skeleton, character.humanoid)
+    if plan is None and not is_sheet(character.vertices, character.faces):
+        plan = plan_by_names(skeleton)
+    return replace(character, plan=plan)

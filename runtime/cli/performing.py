@@ -81,7 +81,7 @@ def _tell_parts(show: Show, told: dict[str, object]) -> None:
         for puppet, parts, rest in zip(act.puppets, session.parts, session.rests, strict=True):
             line = f"{puppet.character.name}: " + "; ".join(map(str, parts))
             if parts and rest is not None and line not in told:
-                messages.say(line)
+                messages.announce(line)
             told[line] = rest
 
 

@@ -19,6 +19,14 @@ def say(line: str) -> None:
             sys.stderr.flush()
 
 
+def announce(line: str) -> None:
+    """Print what a show does to standard output, without tearing a progress bar; never raises."""
+    if sys.stdout is not None:
+        with suppress(OSError, ValueError):
+            tqdm.write(" ".join(line.split()), file=sys.stdout)
+            sys.stdout.flush()
+
+
 def warn(line: str) -> None:
     """Print a warning as `say` prints a line."""
     say(f"warning: {line}")

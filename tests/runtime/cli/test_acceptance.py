@@ -128,7 +128,7 @@ def test_damaged_files_perform_or_are_refused_in_one_line(
         told = capsys.readouterr().err
         if code == 0:
             assert np.isfinite(np.frombuffer(cache.read_bytes(), "<f4", offset=32)).all()
-            assert json.loads(report.read_text())["stretch"]["p99"] < 0.5
+            assert json.loads(report.read_text())["stretch"]["p99"] < 1.0
         else:
             assert (code, told.count("\n")) == (2, 1)
             assert told.startswith("bunraku: error: ")

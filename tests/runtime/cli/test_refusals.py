@@ -14,8 +14,12 @@ from tests.runtime.cli.program import (
 
 
 def _refused(done: subprocess.CompletedProcess[str], *about: str) -> None:
-    assert done.returncode == 2, done.stderr
     assert done.stdout == ""
+    _told(done, *about)
+
+
+def _told(done: subprocess.CompletedProcess[str], *about: str) -> None:
+    assert done.returncode == 2, done.stderr
     assert done.stderr.startswith("bunraku: error: ")
     assert done.stderr.endswith("\n")
     assert done.stderr.count("\n") == 1
@@ -155,4 +159,4 @@ def test_nothing_is_written_over_what_is_read(
 @pytest.mark.parametrize("option", ["--cache", "--report", "--record"])
 def test_a_full_disk_is_told_in_one_line(recording: Path, bunraku: Run, option: str) -> None:
     done = bunraku("replay", recording, "--character", "paper", *SMALL, option, "/dev/full")
-    _refused(done, "/dev/full")
+    _told(done, "/dev/full")
