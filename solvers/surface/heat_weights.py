@@ -3,7 +3,8 @@
 Source: Baran and Popovic 2007, Automatic rigging and animation of 3D characters, section 4. Each
 vertex takes heat from the nearest bone that it sees inside the body, the more the nearer the bone
 is, and heat spreads along the surface. The share of a bone in a vertex is its temperature when that
-bone alone is hot. The heat of an arm cannot jump to the belly beside it.
+bone alone is hot. The heat of an arm cannot jump to the belly beside it, nor that of a bone which
+sticks out of the surface: it lies in front of the skin that it could heat.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ _SMALL = 0.25  # of the character's size: such a part that sees no bone is moved
 
 _BENT = 0.03  # of the size: how far rigid weights are spread
 _WHOLE = 0.999  # a weight that is the whole
+_GRAZES = 0.2  # sine of the angle to the surface: a line at less may leave the body, not enter it
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -191,14 +193,35 @@ def _look(points: Floats, faces: Ints, part_of: Ints, bones: _Bones) -> _Sight:
     seen = np.full((count, INFLUENCES), -1, dtype=np.int64)
     nearest = np.empty(count, dtype=np.int64)
     far = np.full((count, 2), np.inf)
-    _find_bones(box_tree(points, faces), part_of, bones.starts, bones.ends, seen, nearest, far)
+    outward = _outward(points, faces, part_of)
+    _find_bones(
+        box_tree(points, faces), part_of, outward, bones.starts, bones.ends, seen, nearest, far
+    )
     return _Sight(seen, far[:, 0], nearest, far[:, 1])
+
+
+def _outward(points: Floats, faces: Ints, part_of: Ints) -> Floats:
+    """The unit normals (N, 3) of closed parts, outward; zero on a part that has no inside."""
+    a, b, c = (points[faces[:, corner]] for corner in range(3))
+    across = np.cross(b - a, c - a)
+    normals = np.stack(
+        [weighted_sums(faces.ravel(), np.repeat(own, 3), len(points)) for own in across.T], axis=1
+    )
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    parts = int(part_of.max()) + 1
+    volumes = np.bincount(part_of[faces[:, 0]], np.einsum("fi,fi->f", a, across), parts)
+    edges = np.stack([faces.ravel(), np.roll(faces, -1, axis=1).ravel()], axis=1)
+    key, back = edges @ (len(points), 1), edges[:, ::-1] @ (len(points), 1)
+    alone = np.bincount(part_of[edges[~np.isin(key, back), 0]], minlength=parts) > 0
+    normals *= np.where(alone, 0.0, np.sign(volumes))[part_of][:, None]
+    return normals
 
 
 @kernel
 def _find_bones(
     tree: BoxTree,
     part_of: Ints,
+    outward: Floats,
     starts: Floats,
     ends: Floats,
     seen: Ints,
@@ -222,6 +245,11 @@ def _find_bones(
             if d2 > most or found == seen.shape[1]:
                 break
             squared[b] = np.inf
+            ahead = 0.0
+            for axis in range(3):
+                ahead += outward[v, axis] * (points[b, axis] - x[axis])
+            if ahead != 0.0 and ahead > -_GRAZES * math.sqrt(d2):
+                continue
             if not is_blocked(tree, part_of, v, points[b], waiting):
                 if found == 0:
                     far[v, 0] = math.sqrt(d2)

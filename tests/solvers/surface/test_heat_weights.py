@@ -77,6 +77,15 @@ def test_heat_does_not_jump_across_a_gap() -> None:
     assert weights[inner, 3].min() > 0.7
 
 
+@pytest.mark.parametrize("faces", [FACES, FACES[:, ::-1]], ids=["outward", "inward"])
+def test_a_bone_outside_the_body_heats_no_skin(faces: np.ndarray) -> None:
+    """The bone of a thumb may stick out of a hand that hangs beside a hip."""
+    above = VERTICES[:, 1].max() + 0.05
+    nodes = np.vstack([NODES, [[0.6, above, 0.0], [1.4, above, 0.0]]])
+    weights = dense(skin_of_heat(VERTICES, faces, np.array([-1, 0, 1, 0, 3]), nodes), 5)
+    assert weights[:, 3].max() < 1e-6
+
+
 def test_parts_that_see_no_bone_follow_the_nearest_one_rigidly() -> None:
     small = 0.02 * VERTICES + [3.0, 0.7, 0.0]
     vertices = np.concatenate([VERTICES, small, [[0.5, 0.6, 0.0]]])  # and a vertex without a face
