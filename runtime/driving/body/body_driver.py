@@ -183,9 +183,9 @@ class BodyDriver:
         left = rotate(self._trunk[0], self._left)
         self._footing.turn_soles(joints, left, pose.time, given)
         pose_limbs(rig, joints, self._trunk, given, self._twists, rotations, positions)
-        if self._long_arms.raise_arms(
-            positions, rotations, given, self._ratio * self._footing.above
-        ):
+        across = rotate(self._trunk[1], self._left)
+        above = self._ratio * self._footing.above
+        if self._long_arms.raise_arms(positions, rotations, given, across, above):
             pose_limbs(rig, joints, self._trunk, given, self._twists, rotations, positions)
         path = self._path(pose, rest, heading)
         if self._footing.plant(

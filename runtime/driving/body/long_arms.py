@@ -1,7 +1,8 @@
 """Keeps arms and wings that would reach below the floor lying on it.
 
 A bird that let its wings hang as a performer lets the arms hang would stand on them as on stilts,
-and a robot with long arms could not squat.
+and a robot with long arms could not squat. Arms give way to their own side, and forelegs, which stand
+on the floor at rest, to the front.
 """
 
 from __future__ import annotations
@@ -13,12 +14,14 @@ from numpy.typing import NDArray
 
 from devices.bodies.body_plan import Chain
 from runtime.driving.body.body_parts import Arm, Leg
+from runtime.driving.body.rig_builder import LOW
 from solvers.skeleton.quaternions import multiply
 from solvers.skeleton.tree import Tree
 
 Array = NDArray[np.float64]
 
-_ASIDE = 0.3  # of an arm's length: an arm this far below the floor is laid out to its side
+_ASIDE = 0.3  # of an arm's length: an arm this far below the floor is laid out level
+_UP = np.array([0.0, 1.0, 0.0])
 _THICK = 90.0  # percentile of the distances from the surface of a hand to its bones
 
 
@@ -45,6 +48,8 @@ class LongArms:
         self._soles = np.array([leg.target[2:] for leg in legs], dtype=np.int64).ravel()
         self._arms = list(arms) if legs else []
         self._nodes = [list(tree.subtree(arm.target[0])[1:]) for arm in self._arms]
+        low = self._rest[:, 1].min() + LOW * np.ptp(self._rest[:, 1])
+        self._stands = [bool(self._rest[arm.target[-1], 1] < low) for arm in self._arms]
         self._radii = [self._radius(arm.target, vertices, owner) for arm in self._arms]
 
     def _radius(self, arm: Chain, vertices: Array, owner: NDArray[np.int64]) -> float:
@@ -57,13 +62,16 @@ class LongArms:
         gaps = hand - a - np.clip(along, 0.0, 1.0)[:, None] * (b - a)
         return float(np.percentile(np.linalg.norm(gaps, axis=1), _THICK))
 
-    def raise_arms(self, positions: Array, rotations: Array, given: Array, above: float) -> bool:
+    def raise_arms(
+        self, positions: Array, rotations: Array, given: Array, left: Array, above: float
+    ) -> bool:
         """Put the rotations that keep the arms above the floor into `given` (S, 4).
 
         Args:
             positions: (K, 3) [m] of the posed nodes.
             rotations: (K, 4) of the posed nodes.
             given: (S, 4) rotations of the segments, is changed.
+            left: (3,) the chest's left.
             above: [m] how far the feet are above where they stand.
 
         Returns:
@@ -73,13 +81,18 @@ class LongArms:
             return False
         soles = positions[self._soles, 1] - self._rest[self._soles, 1]
         floor = float(soles.min()) + float(self._rest[:, 1].min()) - max(above, 0.0)
-        middle = positions[self._soles].mean(axis=0)
+        shoulders = [arm.target[0] for arm in self._arms]
+        middle = positions[shoulders if len(shoulders) > 1 else self._soles].mean(axis=0)
+        forward = np.cross(left, _UP)
         raised = False
-        for arm, nodes, radius in zip(self._arms, self._nodes, self._radii, strict=True):
+        for arm, nodes, radius, stands in zip(
+            self._arms, self._nodes, self._radii, self._stands, strict=True
+        ):
             shoulder = positions[arm.target[0]]
             ways = positions[nodes] - shoulder
             low = int(np.argmin(ways[:, 1]))
-            turn = _raised(ways[low], shoulder[1] - floor - radius, shoulder - middle)
+            aside = forward if stands else (shoulder - middle) @ left * left
+            turn = _raised(ways[low], shoulder[1] - floor - radius, aside)
             if turn is None:
                 continue
             raised = True
@@ -94,7 +107,7 @@ def _raised(way: Array, room: float, aside: Array) -> Array | None:
     Args:
         way: (3,) [m] from the shoulder to the lowest part of the arm.
         room: [m] from the floor to the shoulder.
-        aside: (3,) to which side the arm lies down if it hangs.
+        aside: (3,) where the arm lies down if it hangs.
     """
     length, below = float(np.linalg.norm(way)), -float(way[1]) - room
     if below <= 0.0 or length < 1e-9:

@@ -17,7 +17,7 @@ from solvers.skeleton.tree import Tree
 Array = NDArray[np.float64]
 
 _DOWN = np.array([0.0, -1.0, 0.0])
-_LOW = 0.15  # of the height: a limb that ends lower stands on the floor
+LOW = 0.15  # of the height: a limb that ends lower stands on the floor
 _BESIDE = 0.35  # of the forearm: bones that begin this near to the wrist are parts of the hand
 
 
@@ -51,7 +51,7 @@ class RigBuilder:
             limbs: the pair.
             least_upright: cosine of the angle to the vertical beyond which a segment leans.
         """
-        low = self._rest[:, 1].min() + _LOW * np.ptp(self._rest[:, 1])
+        low = self._rest[:, 1].min() + LOW * np.ptp(self._rest[:, 1])
         for limb in limbs:
             stands = self._rest[limb.segments[-1][-1], 1] < low
             leans = any(

@@ -25,6 +25,7 @@ NODES = np.array(
 )
 PARENTS = np.array([-1, 0, 1, 0, 3, 4])
 LEG = Leg((0, 1, 2, 2), (0, 1, 2, 2), (2, 3, -1))
+LEFT = np.array([1.0, 0.0, 0.0])
 WING = Arm((3, 4, 5), (0, 1), (3, 4))
 
 
@@ -56,7 +57,7 @@ def test_a_wing_stays_above_the_floor_and_points_as_before_where_it_is(
 ) -> None:
     positions, rotations = hung(Rotation.from_euler("zy", [-about_z, about_y]))
     turns = np.zeros((4, 4))
-    raised = lying().raise_arms(positions, rotations, turns, 0.0)
+    raised = lying().raise_arms(positions, rotations, turns, LEFT, 0.0)
     assert raised == (positions[5, 1] < 0.016)
     if raised:
         tip = positions[3] + Rotation.from_quat(turns[0]).apply(NODES[5] - NODES[3])
@@ -69,17 +70,41 @@ def test_it_begins_where_the_floor_begins() -> None:
     wing = lying()
     turns = np.zeros((4, 4))
     below = Rotation.from_euler("z", -(edge + 1e-6))
-    assert wing.raise_arms(*hung(below), turns, 0.0)
+    assert wing.raise_arms(*hung(below), turns, LEFT, 0.0)
     assert (Rotation.from_quat(turns[0]) * below.inv()).magnitude() < 1e-4
 
 
 def test_an_arm_that_does_not_reach_the_floor_is_let_be() -> None:
     short = Arm((3, 4), (0,), (3,))
     positions, rotations = hung(Rotation.from_euler("z", -np.pi / 2.0))
-    assert not lying(short).raise_arms(positions, rotations, np.zeros((4, 4)), 0.0)
+    assert not lying(short).raise_arms(positions, rotations, np.zeros((4, 4)), LEFT, 0.0)
 
 
 def test_hands_may_be_below_feet_that_are_in_the_air() -> None:
     positions, rotations = hung(Rotation.from_euler("z", -np.pi / 2.0))
-    assert lying().raise_arms(positions, rotations, np.zeros((4, 4)), 0.3)
-    assert not lying().raise_arms(positions, rotations, np.zeros((4, 4)), 0.7)
+    assert lying().raise_arms(positions, rotations, np.zeros((4, 4)), LEFT, 0.3)
+    assert not lying().raise_arms(positions, rotations, np.zeros((4, 4)), LEFT, 0.7)
+
+
+def test_a_hanging_wing_of_a_bird_whose_shoulders_are_ahead_of_its_feet_lies_to_its_side() -> None:
+    positions, rotations = hung(Rotation.from_euler("z", -np.pi / 2.0))
+    positions[3:, 2] += 0.5
+    turns = np.zeros((4, 4))
+    assert lying().raise_arms(positions, rotations, turns, LEFT, 0.0)
+    way = Rotation.from_quat(turns[0]).apply(NODES[5] - NODES[3])
+    assert way[0] > 1.0
+    assert way[2] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_foreleg_that_reaches_below_the_floor_slides_forward() -> None:
+    standing = NODES.copy()
+    standing[3:] = [[0.2, 0.8, 0.5], [0.2, 0.4, 0.5], [0.2, 0.0, 0.5]]
+    offsets = np.array([[0.016, 0.0, 0.0], [-0.016, 0.0, 0.0]])
+    foreleg = LongArms(Tree(PARENTS, standing), standing[4] + offsets, np.full(2, 4), [WING], [LEG])
+    low, turns = standing.copy(), np.zeros((4, 4))
+    low[3:, 1] -= 0.2
+    rotations = np.tile([0.0, 0.0, 0.0, 1.0], (6, 1))
+    assert foreleg.raise_arms(low, rotations, turns, LEFT, 0.0)
+    way = Rotation.from_quat(turns[0]).apply(low[5] - low[3])
+    assert way[2] > 0.3
+    assert way[0] == pytest.approx(0.0, abs=1e-9)
