@@ -1,8 +1,8 @@
 """Keeps arms and wings that would reach below the floor lying on it.
 
 A bird that let its wings hang as a performer lets the arms hang would stand on them as on stilts,
-and a robot with long arms could not squat. Arms give way to their own side, and forelegs, which stand
-on the floor at rest, to the front.
+and a robot with long arms could not squat. Arms give way to their own side, and forelegs, which
+stand on the floor at rest, to the front.
 """
 
 from __future__ import annotations
