@@ -41,7 +41,9 @@ def test_replay_writes_everything_it_is_asked_for(
         "--report", "r.json", "--cache", "c.pc2", "--video", "v.mp4", "--frames", "pictures",
         "--record", "again.mcap", "--export", "e.glb",
     )  # fmt: skip
-    assert (done.returncode, done.stdout) == (0, ""), done.stderr
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith(f"{CHARACTER}: left leg -> left leg, relative, 100 %; ")
+    assert done.stdout.count("\n") == 1
     _check_report(json.loads((tmp_path / "r.json").read_text()))
     cache = point_cache(tmp_path / "c.pc2")
     assert cache.shape == (FRAMES, len(builtin_character(CHARACTER).surface.vertex), 3)

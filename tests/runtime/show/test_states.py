@@ -44,6 +44,7 @@ REMEMBERS = {
     "runtime.driving.match_session.MatchSession",
     "runtime.driving.performer.Performer",
     "runtime.driving.body.body_driver.BodyDriver",
+    "runtime.driving.body.footing.Footing",
     "runtime.driving.polyline_driver.SkinnedPolylineDriver",
     "runtime.driving.puppet_match.PuppetMatch",
     "runtime.driving.unfreeze_blend.UnfreezeBlend",
