@@ -2,7 +2,8 @@
 
 A bird that let its wings hang as a performer lets the arms hang would stand on them as on stilts,
 and a robot with long arms could not squat. Arms give way to their own side, and forelegs, which
-stand on the floor at rest, to the front.
+stand on the floor at rest, to the front. An arm that just reaches the floor while the body stands
+upright is let be, as it points right.
 """
 
 from __future__ import annotations
@@ -21,6 +22,8 @@ from solvers.skeleton.tree import Tree
 Array = NDArray[np.float64]
 
 _ASIDE = 0.3  # of an arm's length: an arm this far below the floor is laid out level
+_JUST = 0.25  # of the shoulder's height: what hangs no farther below the floor is no wing
+_TALL = (0.8, 0.9)  # of the shoulder's height at rest: from none to all of that is let be
 _UP = np.array([0.0, 1.0, 0.0])
 _THICK = 90.0  # percentile of the distances from the surface of a hand to its bones
 
@@ -51,6 +54,18 @@ class LongArms:
         low = self._rest[:, 1].min() + LOW * np.ptp(self._rest[:, 1])
         self._stands = [bool(self._rest[arm.target[-1], 1] < low) for arm in self._arms]
         self._radii = [self._radius(arm.target, vertices, owner) for arm in self._arms]
+        self._heights = [
+            float(self._rest[arm.target[0], 1] - self._rest[:, 1].min()) for arm in self._arms
+        ]
+        self._excess = [self._hanging(number) for number in range(len(self._arms))]
+
+    def _hanging(self, number: int) -> float:
+        """How far [m] an arm that hangs reaches below the floor; 0 for a wing or a foreleg."""
+        shoulder = self._rest[self._arms[number].target[0]]
+        reach = np.linalg.norm(self._rest[self._nodes[number]] - shoulder, axis=1).max()
+        excess = float(reach) + self._radii[number] - self._heights[number]
+        most = 0.0 if self._stands[number] else _JUST * self._heights[number]
+        return excess if 0.0 < excess < most else 0.0
 
     def _radius(self, arm: Chain, vertices: Array, owner: NDArray[np.int64]) -> float:
         """How far [m] the surface of a hand is from its bones."""
@@ -85,14 +100,15 @@ class LongArms:
         middle = positions[shoulders if len(shoulders) > 1 else self._soles].mean(axis=0)
         forward = np.cross(left, _UP)
         raised = False
-        for arm, nodes, radius, stands in zip(
-            self._arms, self._nodes, self._radii, self._stands, strict=True
-        ):
+        for number, arm in enumerate(self._arms):
             shoulder = positions[arm.target[0]]
-            ways = positions[nodes] - shoulder
+            ways = positions[self._nodes[number]] - shoulder
             low = int(np.argmin(ways[:, 1]))
-            aside = forward if stands else (shoulder - middle) @ left * left
-            turn = _raised(ways[low], shoulder[1] - floor - radius, aside)
+            aside = forward if self._stands[number] else (shoulder - middle) @ left * left
+            height = float(shoulder[1]) - floor
+            tall = np.interp(height / self._heights[number], _TALL, (0.0, 1.0))
+            room = height - self._radii[number] + float(tall) * self._excess[number]
+            turn = _raised(ways[low], room, aside)
             if turn is None:
                 continue
             raised = True

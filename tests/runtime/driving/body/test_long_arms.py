@@ -108,3 +108,16 @@ def test_a_foreleg_that_reaches_below_the_floor_slides_forward() -> None:
     way = Rotation.from_quat(turns[0]).apply(low[5] - low[3])
     assert way[2] > 0.3
     assert way[0] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_an_arm_that_just_reaches_the_floor_points_right_while_the_body_is_tall() -> None:
+    straight = Rotation.from_euler("z", -np.pi / 2.0)
+    nodes = NODES.copy()
+    nodes[4:, 0] = [0.6, 1.05]  # 0.85 from the shoulder, which is 0.8 high
+    arm = LongArms(Tree(PARENTS, nodes), nodes[4:5], np.array([4]), [WING], [LEG])
+    positions, rotations = hung(straight)
+    positions[3:] = nodes[3] + straight.apply(nodes[3:] - nodes[3])
+    left = np.array([1.0, 0.0, 0.0])
+    assert not arm.raise_arms(positions, rotations, np.zeros((4, 4)), left, 0.0)
+    positions[3:, 1] -= 0.2  # a squat
+    assert arm.raise_arms(positions, rotations, np.zeros((4, 4)), left, 0.0)
