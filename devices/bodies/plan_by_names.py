@@ -236,7 +236,7 @@ class _Labels:
         paths = [self._tree.chain(outer, joint) for joint in hands]
         shared = [nodes[0] for nodes in zip(*paths, strict=False) if len(set(nodes)) == 1]
         carrier = shared[-1] if len(shared) > 1 else wrist
-        return wrist if self._is(carrier, Kind.LOWER_ARM) else carrier
+        return carrier if self._is(carrier, Kind.HAND) else wrist
 
     def _end(self, joint: int, kinds: Sequence[Kind], side: Side) -> Chain:
         """From the last known joint of a limb to the end of hand or foot; empty for none."""

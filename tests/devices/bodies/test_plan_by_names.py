@@ -178,7 +178,7 @@ def test_characters_without_limbs_have_no_plan(name: str) -> None:
             "raylib_robot_RobotExpressive.glb",
             "Hips Torso",
             "Head",
-            "UpperArm.L LowerArm.L LowerArm.L~parts",
+            "UpperArm.L LowerArm.L Palm2.L",
             "UpperLeg.L LowerLeg.L",
             "arm",
         ),
