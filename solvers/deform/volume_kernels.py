@@ -15,6 +15,7 @@ from numba import prange
 from numpy.typing import NDArray
 
 from solvers.kernels.compiled import kernel, parallel_kernel
+from solvers.kernels.vector import cross, dot
 from solvers.linear.laplacian import Floats
 
 # The most volume that a pressure may restore, as a multiple of the component's mean strain times
@@ -96,28 +97,15 @@ def volume_terms(x: Floats, g: Floats, shell: ClosedShells, strains: Floats, out
             u = g[i, 0], g[i, 1], g[i, 2]
             v = g[j, 0], g[j, 1], g[j, 2]
             w = g[k, 0], g[k, 1], g[k, 2]
-            qr, vw = _cross(q, r), _cross(v, w)
-            mixed = _cross(q, w), _cross(v, r)
-            t0 += _dot(p, qr)
-            t1 += _dot(u, qr) + _dot(p, mixed[0]) + _dot(p, mixed[1])
-            t2 += _dot(p, vw) + _dot(u, mixed[0]) + _dot(u, mixed[1])
-            t3 += _dot(u, vw)
+            qr, vw = cross(q, r), cross(v, w)
+            mixed = cross(q, w), cross(v, r)
+            t0 += dot(p, qr)
+            t1 += dot(u, qr) + dot(p, mixed[0]) + dot(p, mixed[1])
+            t2 += dot(p, vw) + dot(u, mixed[0]) + dot(u, mixed[1])
+            t3 += dot(u, vw)
             strained += areas[face] * (strains[i] + strains[j] + strains[k])
         out[chunk, 0], out[chunk, 1], out[chunk, 2] = t0 / 6.0, t1 / 6.0, t2 / 6.0
         out[chunk, 3], out[chunk, 4] = t3 / 6.0, strained / 3.0
-
-
-_Vector = tuple[float, float, float]
-
-
-@kernel
-def _cross(a: _Vector, b: _Vector) -> _Vector:
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
-
-
-@kernel
-def _dot(a: _Vector, b: _Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 @parallel_kernel

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+from numpy.typing import NDArray
+
 from solvers.kernels.compiled import kernel
 
 Vector = tuple[float, float, float]
@@ -88,3 +91,27 @@ def matrix(q: Quaternion) -> tuple[Vector, Vector, Vector]:
         (2.0 * (x * y + z * w), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - x * w)),
         (2.0 * (x * z - y * w), 2.0 * (y * z + x * w), 1.0 - 2.0 * (x * x + y * y)),
     )
+
+
+@kernel
+def quaternion(rotations: NDArray[np.float64], at: int) -> Quaternion:
+    """Return row `at` of rotations (n, 4)."""
+    return (rotations[at, 0], rotations[at, 1], rotations[at, 2], rotations[at, 3])
+
+
+@kernel
+def is_rotation(q: Quaternion) -> bool:
+    """Whether a row is a rotation at all; zeros stand for an unknown one."""
+    return q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2 > 0.5
+
+
+@kernel
+def from_axes(x: Vector, z: Vector) -> Quaternion:
+    """Return the rotation that takes the axes x and z to these orthogonal unit vectors."""
+    first = between((0.0, 0.0, 1.0), z, (1.0, 0.0, 0.0))
+    sideways = rotate(first, (1.0, 0.0, 0.0))
+    upward = rotate(first, (0.0, 1.0, 0.0))
+    cosine = sideways[0] * x[0] + sideways[1] * x[1] + sideways[2] * x[2]
+    sine = upward[0] * x[0] + upward[1] * x[1] + upward[2] * x[2]
+    angle = 0.5 * math.atan2(sine, cosine)
+    return normalized(multiply(first, (0.0, 0.0, math.sin(angle), math.cos(angle))))

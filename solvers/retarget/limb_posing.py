@@ -20,14 +20,17 @@ from numpy.typing import NDArray
 from solvers.kernels.compiled import kernel
 from solvers.kernels.quaternion import (
     Quaternion,
-    Vector,
     between,
     conjugate,
+    from_axes,
+    is_rotation,
     multiply,
     normalized,
     power,
+    quaternion,
     rotate,
 )
+from solvers.kernels.vector import across, dot, minus, point, scaled, unit
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -37,7 +40,6 @@ RIDES: Final = -1
 BLENDS: Final = -2
 """Role of a node of the trunk or neck, between pelvis, chest and head."""
 
-_SHORT: Final = 1e-9  # squared length [m2] below which two joints give no direction
 _MOST_TWIST: Final = math.radians(270.0)  # of a forearm, before it takes the short way round
 
 
@@ -115,15 +117,8 @@ def pose_limbs(
             for k in range(3):
                 positions[node, k] = rig.rest[node, k]
         else:
-            above = _row(rotations, parent)
-            offset = rotate(
-                above,
-                (
-                    rig.rest[node, 0] - rig.rest[parent, 0],
-                    rig.rest[node, 1] - rig.rest[parent, 1],
-                    rig.rest[node, 2] - rig.rest[parent, 2],
-                ),
-            )
+            above = quaternion(rotations, parent)
+            offset = rotate(above, minus(point(rig.rest, node), point(rig.rest, parent)))
             for k in range(3):
                 positions[node, k] = positions[parent, k] + offset[k]
         turn = above
@@ -131,30 +126,24 @@ def pose_limbs(
         if role == BLENDS:
             turn = _blend(trunk, rig.share[node])
         elif role >= 0:
-            turn = _row(turns, role)
-            if turn[0] ** 2 + turn[1] ** 2 + turn[2] ** 2 + turn[3] ** 2 < 0.5:
+            turn = quaternion(turns, role)
+            if not is_rotation(turn):
                 turn = _turn(rig, role, joints, given, above)
                 end = rig.twisted_by[role]
                 if end >= 0:
                     twists[role] = _twist(rig, role, end, joints, given, turn, twists[role])
                     half = 0.25 * twists[role]  # half of the twist, and half an angle
-                    sine = math.sin(half)
-                    a = rig.along[role]
-                    turn = multiply(turn, (sine * a[0], sine * a[1], sine * a[2], math.cos(half)))
+                    x, y, z = scaled(point(rig.along, role), math.sin(half))
+                    turn = multiply(turn, (x, y, z, math.cos(half)))
                 turns[role, 0], turns[role, 1], turns[role, 2], turns[role, 3] = turn
         rotations[node, 0], rotations[node, 1], rotations[node, 2], rotations[node, 3] = turn
-
-
-@kernel
-def _row(rows: Array, at: int) -> Quaternion:
-    return (rows[at, 0], rows[at, 1], rows[at, 2], rows[at, 3])
 
 
 @kernel
 def _blend(trunk: Array, share: float) -> Quaternion:
     """The rotation between pelvis (0), chest (1) and head (2)."""
     below = min(int(share), 1)
-    first, second = _row(trunk, below), _row(trunk, below + 1)
+    first, second = quaternion(trunk, below), quaternion(trunk, below + 1)
     gap = multiply(conjugate(first), second)
     if gap[3] < 0.0:
         gap = (-gap[0], -gap[1], -gap[2], -gap[3])
@@ -164,25 +153,20 @@ def _blend(trunk: Array, share: float) -> Quaternion:
 @kernel
 def _turn(rig: LimbRig, s: int, joints: Array, given: Array, above: Quaternion) -> Quaternion:
     """The world rotation of a segment from rest; `above` carries it."""
-    own = _row(given, s)
-    if own[0] ** 2 + own[1] ** 2 + own[2] ** 2 + own[3] ** 2 > 0.5:
+    own = quaternion(given, s)
+    if is_rotation(own):
         return own
     near, far = rig.near[s], rig.far[s]
-    x = joints[far, 0] - joints[near, 0]
-    y = joints[far, 1] - joints[near, 1]
-    z = joints[far, 2] - joints[near, 2]
-    squared = x * x + y * y + z * z
-    if not squared > _SHORT:
+    way = unit(minus(point(joints, far), point(joints, near)), (0.0, 0.0, 0.0))
+    if dot(way, way) < 0.5:
         return above
     if rig.across[s, 0] >= 0:
         frame = _hand_frame(joints, near, far, rig.across[s, 0], rig.across[s, 1])
-        if frame[0] ** 2 + frame[1] ** 2 + frame[2] ** 2 + frame[3] ** 2 > 0.5:
-            return normalized(multiply(frame, conjugate(_row(rig.frame, s))))
-    length = math.sqrt(squared)
+        if is_rotation(frame):
+            return normalized(multiply(frame, conjugate(quaternion(rig.frame, s))))
     carry = (0.0, 0.0, 0.0, 1.0) if rig.is_free[s] else above
-    a = rig.along[s]
-    carried = rotate(carry, (a[0], a[1], a[2]))
-    swing = between(carried, (x / length, y / length, z / length), (0.0, 0.0, 1.0))
+    carried = rotate(carry, point(rig.along, s))
+    swing = between(carried, way, (0.0, 0.0, 1.0))
     return normalized(multiply(swing, carry))
 
 
@@ -199,8 +183,7 @@ def _twist(
     """The angle [rad] by which segment `end` is twisted against segment s about its axis."""
     beyond = _turn(rig, end, joints, given, turn)
     gap = multiply(conjugate(turn), beyond)
-    a = rig.along[s]
-    along = gap[0] * a[0] + gap[1] * a[1] + gap[2] * a[2]
+    along = dot((gap[0], gap[1], gap[2]), point(rig.along, s))
     angle = 2.0 * math.atan2(along, gap[3])
     whole = 2.0 * math.pi
     angle += whole * math.floor((before - angle) / whole + 0.5)
@@ -212,43 +195,9 @@ def _twist(
 @kernel
 def _hand_frame(points: Array, near: int, far: int, first: int, second: int) -> Quaternion:
     """The orientation of a hand: see `hand_frame`; zero where the points do not define it."""
-    z = _unit(
-        (
-            points[far, 0] - points[near, 0],
-            points[far, 1] - points[near, 1],
-            points[far, 2] - points[near, 2],
-        )
-    )
-    across = (
-        points[second, 0] - points[first, 0],
-        points[second, 1] - points[first, 1],
-        points[second, 2] - points[first, 2],
-    )
-    along = across[0] * z[0] + across[1] * z[1] + across[2] * z[2]
-    x = _unit((across[0] - along * z[0], across[1] - along * z[1], across[2] - along * z[2]))
-    if x[0] ** 2 + x[1] ** 2 + x[2] ** 2 < 0.5 or z[0] ** 2 + z[1] ** 2 + z[2] ** 2 < 0.5:
+    zero = (0.0, 0.0, 0.0)
+    z = unit(minus(point(points, far), point(points, near)), zero)
+    x = unit(across(minus(point(points, second), point(points, first)), z), zero)
+    if dot(x, x) < 0.5 or dot(z, z) < 0.5:
         return (0.0, 0.0, 0.0, 0.0)
-    return orientation(x, z)
-
-
-@kernel
-def _unit(v: Vector) -> Vector:
-    """The unit vector; zero where the length is next to nothing or not a number."""
-    squared = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
-    if not squared > _SHORT:
-        return (0.0, 0.0, 0.0)
-    length = math.sqrt(squared)
-    return (v[0] / length, v[1] / length, v[2] / length)
-
-
-@kernel
-def orientation(x: Vector, z: Vector) -> Quaternion:
-    """Return the rotation that takes the axes x and z to these orthogonal unit vectors."""
-    first = between((0.0, 0.0, 1.0), z, (1.0, 0.0, 0.0))
-    sideways = rotate(first, (1.0, 0.0, 0.0))
-    upward = rotate(first, (0.0, 1.0, 0.0))
-    cosine = sideways[0] * x[0] + sideways[1] * x[1] + sideways[2] * x[2]
-    sine = upward[0] * x[0] + upward[1] * x[1] + upward[2] * x[2]
-    angle = 0.5 * math.atan2(sine, cosine)
-    s = math.sin(angle)
-    return normalized(multiply(first, (0.0, 0.0, s, math.cos(angle))))
+    return from_axes(x, z)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -14,19 +13,20 @@ from solvers.kernels.quaternion import (
     Vector,
     between,
     conjugate,
+    from_axes,
+    is_rotation,
     multiply,
     normalized,
+    quaternion,
     rotate,
 )
-from solvers.retarget.limb_posing import orientation
+from solvers.kernels.vector import across, cross, dot, minus, plus, point, scaled, unit
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
 UPRIGHT: Final = np.tile([0.0, 0.0, 0.0, 1.0], (3, 1))
 """Turns (3, 4) of a trunk that stands upright and faces +Z."""
-
-_SHORT: Final = 1e-9  # squared length [m2] below which two joints give no direction
 
 
 class TrunkJoints(NamedTuple):
@@ -68,15 +68,15 @@ def _turns(joints: Array, of: TrunkJoints, upright: Array, before: Array, out: A
     frames = np.zeros((3, 4))
     _orientations(joints, of, frames)
     for part in range(3):
-        own = _row(frames, part)
-        if own[0] ** 2 + own[1] ** 2 + own[2] ** 2 + own[3] ** 2 > 0.5:
-            turn = normalized(multiply(own, conjugate(_row(upright, part))))
+        own = quaternion(frames, part)
+        if is_rotation(own):
+            turn = normalized(multiply(own, conjugate(quaternion(upright, part))))
         elif part == 2 and of.head >= 0:
-            turn = _nod(joints, of, upright, _row(out, 1))
+            turn = _nod(joints, of, upright, quaternion(out, 1))
         elif part > 0:
-            turn = _row(out, part - 1)
+            turn = quaternion(out, part - 1)
         else:
-            turn = _row(before, part)
+            turn = quaternion(before, part)
         out[part, 0], out[part, 1], out[part, 2], out[part, 3] = turn
 
 
@@ -99,25 +99,20 @@ def _orientations(joints: Array, of: TrunkJoints, out: Array) -> None:
     low = _middle(joints, hips[0], hips[1])
     high = _middle(joints, shoulders[0], shoulders[1])
     if of.neck >= 0:
-        high = _point(joints, of.neck)
-    waist = _point(joints, of.waist) if of.waist >= 0 else high
+        high = point(joints, of.neck)
+    waist = point(joints, of.waist) if of.waist >= 0 else high
     if hips[0] >= 0:
-        _put(out, 0, _frame(_gap(joints, hips[1], hips[0]), _minus(waist, low)))
+        _put(out, 0, _frame(_gap(joints, hips[1], hips[0]), minus(waist, low)))
     if of.waist < 0:
         waist = low
     if shoulders[0] >= 0:
-        _put(out, 1, _frame(_gap(joints, shoulders[1], shoulders[0]), _minus(high, waist)))
+        _put(out, 1, _frame(_gap(joints, shoulders[1], shoulders[0]), minus(high, waist)))
     if of.face[2] >= 0:
         left = _gap(joints, of.face[1], of.face[0])
-        nose = _point(joints, of.face[2])
-        front = _minus(nose, _middle(joints, of.face[0], of.face[1]))
+        nose = point(joints, of.face[2])
+        front = minus(nose, _middle(joints, of.face[0], of.face[1]))
         # y is what is perpendicular to both, so that a nose below the ears makes no nod
-        up = (
-            front[1] * left[2] - front[2] * left[1],
-            front[2] * left[0] - front[0] * left[2],
-            front[0] * left[1] - front[1] * left[0],
-        )
-        _put(out, 2, _frame(left, up))
+        _put(out, 2, _frame(left, cross(front, left)))
 
 
 @kernel
@@ -125,7 +120,7 @@ def _nod(joints: Array, of: TrunkJoints, upright: Array, chest: Quaternion) -> Q
     """The turn of a head that only shows where it rises to: the smallest, on the chest's."""
     rise = _rise(joints, of)
     rest = (upright[2, 0], upright[2, 1], upright[2, 2])
-    if rise[0] ** 2 + rise[1] ** 2 + rise[2] ** 2 < 0.5:
+    if dot(rise, rise) < 0.5:
         return chest
     swing = between(rotate(chest, rest), rise, (1.0, 0.0, 0.0))
     return normalized(multiply(swing, chest))
@@ -136,20 +131,19 @@ def _rise(joints: Array, of: TrunkJoints) -> Vector:
     """The unit vector from the neck to the head; zero for none."""
     base = _middle(joints, of.shoulders[0], of.shoulders[1])
     if of.neck >= 0:
-        base = _point(joints, of.neck)
-    return _unit(_minus(_point(joints, of.head), base))
+        base = point(joints, of.neck)
+    return unit(minus(point(joints, of.head), base), (0.0, 0.0, 0.0))
 
 
 @kernel
 def _frame(left: Vector, up: Vector) -> Quaternion:
     """The orientation whose x is `left` and whose y is nearest to `up`; zero where they fail."""
-    x = _unit(left)
-    along = up[0] * x[0] + up[1] * x[1] + up[2] * x[2]
-    y = _unit((up[0] - along * x[0], up[1] - along * x[1], up[2] - along * x[2]))
-    if x[0] ** 2 + x[1] ** 2 + x[2] ** 2 < 0.5 or y[0] ** 2 + y[1] ** 2 + y[2] ** 2 < 0.5:
+    zero = (0.0, 0.0, 0.0)
+    x = unit(left, zero)
+    y = unit(across(up, x), zero)
+    if dot(x, x) < 0.5 or dot(y, y) < 0.5:
         return (0.0, 0.0, 0.0, 0.0)
-    z = (x[1] * y[2] - x[2] * y[1], x[2] * y[0] - x[0] * y[2], x[0] * y[1] - x[1] * y[0])
-    return orientation(x, z)
+    return from_axes(x, cross(x, y))
 
 
 @kernel
@@ -158,23 +152,8 @@ def _put(out: Array, part: int, q: Quaternion) -> None:
 
 
 @kernel
-def _row(rows: Array, at: int) -> Quaternion:
-    return (rows[at, 0], rows[at, 1], rows[at, 2], rows[at, 3])
-
-
-@kernel
-def _point(joints: Array, at: int) -> Vector:
-    return (joints[at, 0], joints[at, 1], joints[at, 2])
-
-
-@kernel
-def _minus(a: Vector, b: Vector) -> Vector:
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
-
-
-@kernel
 def _gap(joints: Array, start: int, end: int) -> Vector:
-    return _minus(_point(joints, end), _point(joints, start))
+    return minus(point(joints, end), point(joints, start))
 
 
 @kernel
@@ -182,14 +161,4 @@ def _middle(joints: Array, first: int, second: int) -> Vector:
     """The point between two joints; the origin where they are not there."""
     if first < 0 or second < 0:
         return (0.0, 0.0, 0.0)
-    a, b = _point(joints, first), _point(joints, second)
-    return (0.5 * (a[0] + b[0]), 0.5 * (a[1] + b[1]), 0.5 * (a[2] + b[2]))
-
-
-@kernel
-def _unit(v: Vector) -> Vector:
-    squared = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
-    if not squared > _SHORT:
-        return (0.0, 0.0, 0.0)
-    length = math.sqrt(squared)
-    return (v[0] / length, v[1] / length, v[2] / length)
+    return scaled(plus(point(joints, first), point(joints, second)), 0.5)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from solvers.kernels.compiled import kernel
 from solvers.kernels.quaternion import Quaternion, Vector, between, multiply, normalized, rotate
+from solvers.kernels.vector import cross, dot, minus, norm, plus, scaled, unit
 
 Array = NDArray[np.float64]
 
@@ -66,17 +67,17 @@ def bend(
     hip: Vector, knee: Vector, ankle: Vector, goal: Vector, axis: Vector
 ) -> tuple[Quaternion, Quaternion]:
     """Return the rotations of the upper and the lower bone: see `two_bone_turns`."""
-    upper, lower = _minus(knee, hip), _minus(ankle, knee)
-    a, b = _length(upper), _length(lower)
+    upper, lower = minus(knee, hip), minus(ankle, knee)
+    a, b = norm(upper), norm(lower)
     still = (0.0, 0.0, 0.0, 1.0)
     if min(a, b) <= _NOTHING * (a + b):
         return still, still
-    line, wish = _minus(ankle, hip), _minus(goal, hip)
-    before, wanted = _length(line), _length(wish)
+    line, wish = minus(ankle, hip), minus(goal, hip)
+    before, wanted = norm(line), norm(wish)
     least = _NOTHING * (a + b)
     # A limb that is folded onto its hip points nowhere: its upper bone stands for it.
-    along = _scaled(line, 1.0 / before) if before > least else _scaled(upper, 1.0 / a)
-    towards = _scaled(wish, 1.0 / wanted) if wanted > least else along
+    along = scaled(line, 1.0 / before) if before > least else scaled(upper, 1.0 / a)
+    towards = scaled(wish, 1.0 / wanted) if wanted > least else along
     swing = between(along, towards, axis)
     after = min(max(wanted, abs(a - b)), a + b)
     forth = 0.5 * after
@@ -84,8 +85,8 @@ def bend(
         forth = 0.5 * (after + (a * a - b * b) / after)
     forth = min(max(forth, -a), a)
     aside = _knee_side(upper, along, axis, swing, towards, a, forth, a + b)
-    new_upper = _plus(_scaled(towards, forth), aside)
-    new_lower = _minus(_scaled(towards, after), new_upper)
+    new_upper = plus(scaled(towards, forth), aside)
+    new_lower = minus(scaled(towards, after), new_upper)
     return (
         _turned_to(upper, new_upper, swing, axis),
         _turned_to(lower, new_lower, swing, axis),
@@ -104,24 +105,24 @@ def _knee_side(
     limb: float,
 ) -> Vector:
     """Where the knee is off the line from hip to goal: on its own side, as far as it has to be."""
-    own = rotate(swing, _minus(upper, _scaled(along, _dot(upper, along))))
-    stands_out = _length(own)
+    own = rotate(swing, minus(upper, scaled(along, dot(upper, along))))
+    stands_out = norm(own)
     far = math.sqrt(max(length * length - forth * forth, 0.0))
     x, y, z = towards
-    any_side = _unit((0.0, -z, y) if abs(x) < 0.9 else (-z, 0.0, x), (0.0, 0.0, 0.0))
-    side = _unit(_cross(towards, rotate(swing, axis)), any_side)
-    side = _unit(_plus(_scaled(own, 1.0 / limb), _scaled(side, _SENSE)), _unit(own, side))
+    any_side = unit((0.0, -z, y) if abs(x) < 0.9 else (-z, 0.0, x), (0.0, 0.0, 0.0))
+    side = unit(cross(towards, rotate(swing, axis)), any_side)
+    side = unit(plus(scaled(own, 1.0 / limb), scaled(side, _SENSE)), unit(own, side))
     # What is added to the knee's own offset goes to that side, so that nothing to add is nothing.
-    moved = _plus(own, _scaled(side, far - stands_out))
-    moved = _minus(moved, _scaled(towards, _dot(moved, towards)))
-    return _scaled(_unit(moved, side), far)
+    moved = plus(own, scaled(side, far - stands_out))
+    moved = minus(moved, scaled(towards, dot(moved, towards)))
+    return scaled(unit(moved, side), far)
 
 
 @kernel
 def _turned_to(old: Vector, new: Vector, swing: Quaternion, axis: Vector) -> Quaternion:
     """The swing, and after it the smallest rotation that takes one bone's direction to another."""
-    here = _unit(rotate(swing, old), (0.0, 1.0, 0.0))
-    return normalized(multiply(between(here, _unit(new, here), axis), swing))
+    here = unit(rotate(swing, old), (0.0, 1.0, 0.0))
+    return normalized(multiply(between(here, unit(new, here), axis), swing))
 
 
 @kernel
@@ -138,8 +139,8 @@ def within_reach(hip: Vector, ankle: Vector, goal: Vector, length: float) -> Vec
         goal: [m] for the ankle.
         length: [m] of both bones together.
     """
-    wish = _minus(goal, hip)
-    own, far = _length(_minus(ankle, hip)), _length(wish)
+    wish = minus(goal, hip)
+    own, far = norm(minus(ankle, hip)), norm(wish)
     if far <= own:
         straight = (own / length - NEARLY) / (1.0 - NEARLY)
         steep = wish[1] * wish[1] / max(far * far, _NOTHING)
@@ -173,39 +174,3 @@ def soft_reach(wanted: float, own: float, length: float) -> float:
     if room <= _NOTHING * length:
         return start
     return start + room * (1.0 - math.exp((start - wanted) / room))
-
-
-@kernel
-def _plus(a: Vector, b: Vector) -> Vector:
-    return (a[0] + b[0], a[1] + b[1], a[2] + b[2])
-
-
-@kernel
-def _minus(a: Vector, b: Vector) -> Vector:
-    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
-
-
-@kernel
-def _scaled(a: Vector, by: float) -> Vector:
-    return (by * a[0], by * a[1], by * a[2])
-
-
-@kernel
-def _dot(a: Vector, b: Vector) -> float:
-    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-
-
-@kernel
-def _cross(a: Vector, b: Vector) -> Vector:
-    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
-
-
-@kernel
-def _length(a: Vector) -> float:
-    return math.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
-
-
-@kernel
-def _unit(a: Vector, otherwise: Vector) -> Vector:
-    length = _length(a)
-    return _scaled(a, 1.0 / length) if length > 1e-12 else otherwise
