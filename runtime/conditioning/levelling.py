@@ -16,6 +16,7 @@ from runtime.conditioning.body_anatomy import BodyAnatomy
 from solvers.kernels.compiled import kernel
 from solvers.kernels.short_loops import put
 from solvers.signal.floor_plane import FloorFit, FloorState, upright
+from solvers.skeleton.quaternions import followed_by
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -105,6 +106,11 @@ class Levelling:
     def level(self, positions: Array) -> Array:
         """Positions (J, 3) [m] with the floor at y = 0."""
         return _levelled(positions, self._turn, self._rise)
+
+    def level_rotations(self, rotations: Array) -> Array:
+        """World rotations (J, 4), turned as the positions are; NaN stays NaN."""
+        known = np.isfinite(rotations.sum(axis=1))
+        return followed_by(rotations, self._turn, known=known)
 
     def _correct(self, a: float, b: float, height: float) -> None:
         """Let the correction bring y = a x + b z + height to y = 0, turning about the origin."""

@@ -155,9 +155,12 @@ class Performer:
         return self.pose
 
     def _rotations(self, frame: SkeletonFrame, mirror: bool) -> Array | None:
-        if frame.rotations is None or not mirror:
-            return frame.rotations
-        return mirrored_rotations(frame.rotations, self._conditioner.partner)
+        rotations, conditioner = frame.rotations, self._conditioner
+        if rotations is not None and conditioner.switches.level:
+            rotations = conditioner.levelling.level_rotations(rotations)
+        if rotations is not None and mirror:
+            rotations = mirrored_rotations(rotations, conditioner.partner)
+        return rotations
 
     def snapshot(self) -> PerformerState:
         """Return the memory between two frames; poses are immutable and shared."""

@@ -12,15 +12,14 @@ from devices.bodies.body_plan import SIDES
 from devices.bodies.plan_by_names import plan_by_names
 from devices.bodies.rest_heading import rest_heading
 from devices.errors import InputError
-from runtime.driving.body.body_parts import BodyParts, body_parts
+from runtime.driving.body.body_parts import TwoBodies, body_parts
 from runtime.driving.body.footing import Footing, FootingState
-from runtime.driving.body.joint_turns import JointTurns, about_vertical
+from runtime.driving.body.joint_turns import JointTurns
 from runtime.driving.body.long_arms import LongArms
 from runtime.driving.body.path import Path
 from runtime.driving.body.upright import upright_at_rest, upright_in_poses
-from runtime.driving.driver import DrivenPart, Highlight, Needs
+from runtime.driving.driver import Highlight, Needs
 from runtime.driving.pairing import Pairing
-from runtime.driving.part_names import part_name
 from runtime.driving.performer import Pose, Rest
 from runtime.driving.root_motion import chain_length
 from runtime.driving.targets import PosedNodes, Targets
@@ -70,6 +69,7 @@ class BodyDriver:
         pairing: the performer and the character.
 
     Attributes:
+        parts: what drives what, in words and numbers.
         least_upright: cosine of the angle to the vertical beyond which a leg counts as bent.
 
     Raises:
@@ -81,64 +81,32 @@ class BodyDriver:
     least_upright = float(np.cos(np.radians(35.0)))
 
     def __init__(self, pairing: Pairing) -> None:
-        performer, character, skeleton = pairing.performer, pairing.character, pairing.skeleton
-        plan, source = character.plan, plan_by_names(performer)
-        if plan is None or source is None:
-            who = character.name if plan is None else "the performer"
-            raise InputError(f"{who} has no limbs that are known: use --drive relative")
-        self._facing = rest_heading(character.skeleton, plan)
-        heading_at_rest = rest_heading(performer, source)
-        upright = turned(performer.rest_positions, self._facing - heading_at_rest, np.zeros(3))
-        parts = body_parts(
-            performer,
-            pairing.joints,
-            upright,
-            skeleton.tree.rerooted(plan.hips),
-            plan,
-            source,
-            self._facing,
-            self.least_upright,
-        )
+        self._skeleton = skeleton = pairing.skeleton
+        bodies, heading_at_rest = _two_bodies(pairing)
+        parts = body_parts(bodies, self.least_upright)
         if parts is None:
-            raise InputError(f"{character.name} has no part that the performer has too")
-        self._parts: BodyParts = parts
-        self._skeleton = skeleton
-        self._character = character
-        self._at_rest_upright = upright_at_rest(upright, self._facing, parts.trunk)
-        self._upright = self._at_rest_upright
+            raise InputError(f"{pairing.character.name} has no part that the performer has too")
+        self.parts = parts.parts
+        self._parts, self._facing = parts, bodies.facing
+        self._upright_at_rest = upright_at_rest(bodies.upright, bodies.facing, parts.trunk)
         self._joint_turns = JointTurns(
-            performer, (*parts.hands, parts.skull), heading_at_rest, self._facing
+            bodies.performer, (*parts.hands, parts.skull), heading_at_rest, bodies.facing
         )
-        self._rest: Rest | None = None
-        self._ratio = self._size_ratio(upright)
+        self._ratio = self._size_ratio(bodies.upright)
         # Who sits before a camera, or lends one arm only, does not move the whole.
         self._goes_along = len(parts.legs) == len(SIDES)
-        self._hips = plan.hips
-        body = {joint for part in parts.parts for joint in part.source}
-        body -= {joint for leg in parts.legs for joint in leg.source[2:]}
-        self._footing = Footing(
-            performer,
-            upright,
-            skeleton.tree.positions,
-            parts.legs,
-            sorted(body),
-            parts.trunk,
-            rotate(about_vertical(self._facing), np.array([0.0, 0.0, 1.0])),
-        )
-        self._long_arms = LongArms(
-            skeleton.tree.rerooted(plan.hips),
-            pairing.surface.rest,
-            skeleton.skin.nodes[:, 0],
-            parts.arms,
-            parts.legs,
-        )
-        left = [np.cos(self._facing), 0.0, -np.sin(self._facing)]
-        self._left = np.array(left)
+        self._hips = bodies.tree.root
+        self._left = np.array([np.cos(bodies.facing), 0.0, -np.sin(bodies.facing)])
+        self._footing = Footing(bodies, parts)
+        owner = skeleton.skin.nodes[:, 0]
+        self._long_arms = LongArms(bodies.tree, pairing.surface.rest, owner, parts.arms, parts.legs)
+        self._at_rest = Targets(skeleton.skinned(skeleton.rest_nodes), nodes=skeleton.rest_nodes)
+        self._rest: Rest | None = None
         self._origin: Array | None = None
+        self._upright = self._upright_at_rest
         self._trunk = UPRIGHT
         self._twists = np.zeros(len(parts.rig.near))
         self._nodes = skeleton.rest_nodes
-        self._at_rest = Targets(skeleton.skinned(self._nodes), nodes=self._nodes)
 
     def _size_ratio(self, upright: Array) -> float:
         """How long the character's legs are for each metre of the performer's."""
@@ -156,14 +124,14 @@ class BodyDriver:
         self._rest = rest
         self._origin = clip[0].hips[[0, 2]] if clip else None
         self.reset()
-        self._upright = self._at_rest_upright
+        self._upright = self._upright_at_rest
         known = bool(clip) and self._joint_turns.learn(clip[0])
         if rest is not None and not known:
             step = max(len(clip) // _MEASURED, 1)
             shown = [pose.facing(self._facing) for pose in clip[::step]]
             own = turned(rest.positions, self._facing - rest.heading, np.zeros(3))
             self._upright = upright_in_poses(
-                self._at_rest_upright, self._parts.trunk, shown or [own]
+                self._upright_at_rest, self._parts.trunk, shown or [own]
             )
 
     def targets(self, pose: Pose) -> Targets:
@@ -241,26 +209,11 @@ class BodyDriver:
         self._footing.reset()
 
     @property
-    def parts(self) -> list[DrivenPart]:
-        """The parts that drive, in words."""
-        skeleton, plan = self._character.skeleton, self._character.plan
-        return [
-            DrivenPart(
-                part.name,
-                part_name(skeleton, plan, part.target),
-                part.source,
-                part.target,
-                part.drive,
-            )
-            for part in self._parts.parts
-        ]
-
-    @property
     def highlights(self) -> list[Highlight]:
         """The driven parts; each lights up with the joints that drive it."""
         return [
             Highlight(self._nodes.positions[list(part.target)], part.source[1:])
-            for part in self._parts.parts
+            for part in self.parts
         ]
 
     def snapshot(self) -> BodyState:
@@ -284,6 +237,32 @@ class BodyDriver:
         self._twists, self._upright = state.twists.copy(), state.upright
         self._joint_turns.restore(state.rest_turn)
         self._footing.restore(state.footing)
+
+
+def _two_bodies(pairing: Pairing) -> tuple[TwoBodies, float]:
+    """The performer and the character side by side; the heading [rad] of the performer at rest.
+
+    Raises:
+        InputError: one of them has no limbs that are known.
+    """
+    performer, character = pairing.performer, pairing.character
+    plan, source = character.plan, plan_by_names(performer)
+    if plan is None or source is None:
+        who = character.name if plan is None else "the performer"
+        raise InputError(f"{who} has no limbs that are known: use --drive relative")
+    facing = rest_heading(character.skeleton, plan)
+    heading_at_rest = rest_heading(performer, source)
+    bodies = TwoBodies(
+        performer=performer,
+        source=source,
+        joints=frozenset(pairing.joints),
+        upright=turned(performer.rest_positions, facing - heading_at_rest, np.zeros(3)),
+        character=character.skeleton,
+        plan=plan,
+        tree=pairing.skeleton.tree.rerooted(plan.hips),
+        facing=facing,
+    )
+    return bodies, heading_at_rest
 
 
 class AbsoluteBodyDriver(BodyDriver):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +13,8 @@ from devices.bodies.joint_labels import label_joints
 from devices.bodies.joint_names import Kind, Side
 from devices.skeleton import Skeleton
 from runtime.driving.body.rig_builder import RigBuilder
-from runtime.driving.driver import ABSOLUTE, RELATIVE
+from runtime.driving.driver import ABSOLUTE, RELATIVE, DrivenPart
+from runtime.driving.part_names import part_name
 from solvers.retarget.limb_posing import LimbRig
 from solvers.retarget.trunk_turns import TrunkJoints
 from solvers.skeleton.tree import Tree
@@ -21,24 +22,6 @@ from solvers.skeleton.tree import Tree
 Array = NDArray[np.float64]
 
 _WAIST = (0.2, 0.8)  # shares of the trunk between which a joint shows the waist
-
-
-@dataclass(frozen=True, slots=True)
-class Part:
-    """A part of the performer that drives the same part of the character.
-
-    Attributes:
-        name: in words: "left arm".
-        source: joints, from the trunk outward.
-        target: nodes, from the trunk outward.
-        drive: `ABSOLUTE` if it points where the performer's part points, `RELATIVE` if it turns
-            from its rest pose as the performer's turns from standing upright.
-    """
-
-    name: str
-    source: Chain
-    target: Chain
-    drive: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +69,7 @@ class BodyParts:
         arms: the arms that are driven absolutely.
     """
 
-    parts: tuple[Part, ...]
+    parts: tuple[DrivenPart, ...]
     rig: LimbRig
     trunk: TrunkJoints
     hands: NDArray[np.int64]
@@ -96,67 +79,97 @@ class BodyParts:
     arms: tuple[Arm, ...]
 
 
-def body_parts(
-    performer: Skeleton,
-    joints: Collection[int],
-    upright: Array,
-    tree: Tree,
-    plan: BodyPlan,
-    source: BodyPlan,
-    facing: float,
-    least_upright: float,
-) -> BodyParts | None:
+@dataclass(frozen=True, slots=True, eq=False)
+class TwoBodies:
+    """A performer and a character, side by side and turned alike.
+
+    Attributes:
+        performer: the performer's skeleton.
+        source: the performer's body.
+        joints: the performer's joints that may drive.
+        upright: (J, 3) [m] the performer standing upright, turned as the character faces.
+        character: the character's skeleton.
+        plan: the character's body.
+        tree: the character's nodes at rest, rooted at its hips.
+        facing: [rad] the heading of both.
+    """
+
+    performer: Skeleton
+    source: BodyPlan
+    joints: frozenset[int]
+    upright: Array
+    character: Skeleton
+    plan: BodyPlan
+    tree: Tree
+    facing: float
+
+    def part(self, source: Chain, target: Chain, drive: str) -> DrivenPart:
+        """A chain of joints that drives a chain of nodes, in words."""
+        name = part_name(self.performer, self.source, source)
+        target_name = part_name(self.character, self.plan, target)
+        return DrivenPart(name, target_name, source, target, drive)
+
+    def pairs(
+        self, theirs: Mapping[Side, Limb], ours: Mapping[Side, Limb]
+    ) -> Iterator[tuple[Side, Limb, Limb]]:
+        """The limbs of both that correspond, where the performer's may drive."""
+        for side in SIDES:
+            if side in theirs and side in ours:
+                upper = theirs[side].upper
+                if self.joints.issuperset((upper[0], upper[-1])):
+                    yield side, theirs[side], ours[side]
+
+    @property
+    def trunk_drives(self) -> bool:
+        """Whether the performer's trunk may drive."""
+        return not self.joints.isdisjoint(self.source.trunk[1:])
+
+    @property
+    def head_drives(self) -> bool:
+        """Whether the performer's head may drive the character's."""
+        both = self.source.head and self.plan.head
+        return bool(both) and not self.joints.isdisjoint(self.source.head[1:])
+
+
+def body_parts(bodies: TwoBodies, least_upright: float) -> BodyParts | None:
     """Return the parts that both bodies have; None where no limb and no head corresponds.
 
     Args:
-        performer: the performer's skeleton.
-        joints: those of its joints that may drive.
-        upright: (J, 3) [m] the performer standing upright, turned as the character faces.
-        tree: the character's nodes at rest, rooted at its hips.
-        plan: the character's body.
-        source: the performer's body.
-        facing: [rad] the heading of both.
+        bodies: the performer and the character.
         least_upright: as of `RigBuilder.drive_of`.
     """
-    rig = RigBuilder(tree, upright, facing)
-    parts: list[Part] = []
+    source, plan = bodies.source, bodies.plan
+    rig = RigBuilder(bodies.tree, bodies.upright, bodies.facing)
+    parts: list[DrivenPart] = []
     legs: list[Leg] = []
     arms: list[Arm] = []
-    chosen = frozenset(joints)
-    for side in SIDES:
-        theirs, ours = source.legs.get(side), plan.legs.get(side)
-        if theirs and ours and chosen.issuperset((theirs.upper[0], theirs.upper[-1])):
-            drive = rig.drive_of(plan.legs.values(), least_upright)
-            segments = rig.add_leg(theirs, ours, drive)
-            parts.append(Part(f"{side} leg", _joined(theirs), _joined(ours), drive))
-            if theirs.lower and ours.lower:
-                legs.append(Leg(_bends(theirs), _bends(ours), segments))
-    for side in SIDES:
-        theirs, ours = source.arms.get(side), plan.arms.get(side)
-        if theirs and ours and chosen.issuperset((theirs.upper[0], theirs.upper[-1])):
-            first = rig.segments
-            drive = rig.drive_of(plan.arms.values(), least_upright)
-            palms = _knuckles(source, side), _knuckles(plan, side)
-            rig.add_arm(theirs, ours, *palms, drive)
-            parts.append(Part(f"{side} arm", _joined(theirs), _joined(ours), drive))
-            if drive == ABSOLUTE:
-                numbers = tuple(range(first, rig.segments))
-                starts = tuple(chain[0] for chain in ours.segments[: len(numbers)])
-                arms.append(Arm(_joined(ours), numbers, starts))
-            rig.add_fingers(source, plan, side)
-    has_head = bool(source.head and plan.head) and not chosen.isdisjoint(source.head[1:])
-    if not parts and not has_head:
+    drive = rig.drive_of(plan.legs.values(), least_upright)
+    for _, theirs, ours in bodies.pairs(source.legs, plan.legs):
+        segments = rig.add_leg(theirs, ours, drive)
+        parts.append(bodies.part(theirs.chain, ours.chain, drive))
+        if theirs.lower and ours.lower:
+            legs.append(Leg(_bends(theirs), _bends(ours), segments))
+    drive = rig.drive_of(plan.arms.values(), least_upright)
+    for side, theirs, ours in bodies.pairs(source.arms, plan.arms):
+        palms = _knuckles(source, side), _knuckles(plan, side)
+        numbers = rig.add_arm(theirs, ours, *palms, drive)
+        parts.append(bodies.part(theirs.chain, ours.chain, drive))
+        if drive == ABSOLUTE:
+            starts = tuple(chain[0] for chain in ours.segments[: len(numbers)])
+            arms.append(Arm(ours.chain, numbers, starts))
+        rig.add_fingers(source, plan, side)
+    if not parts and not bodies.head_drives:
         return None
-    if len(plan.trunk) > 1 and len(source.trunk) > 1 and not chosen.isdisjoint(source.trunk[1:]):
-        parts.append(Part("trunk", source.trunk, plan.trunk, RELATIVE))
-    rig.blend_trunk(plan, has_head)
-    if has_head:
-        parts.append(Part("head", source.head, plan.head, RELATIVE))
-    skull = source.skull if has_head and source.skull is not None else -1
+    if len(plan.trunk) > 1 and bodies.trunk_drives:
+        parts.append(bodies.part(source.trunk, plan.trunk, RELATIVE))
+    rig.blend_trunk(plan, bodies.head_drives)
+    if bodies.head_drives:
+        parts.append(bodies.part(source.head, plan.head, RELATIVE))
+    skull = source.skull if bodies.head_drives and source.skull is not None else -1
     return BodyParts(
         tuple(parts),
         rig.finished(),
-        _trunk_joints(performer, source, chosen),
+        _trunk_joints(bodies, both_legs=len(legs) == len(SIDES)),
         np.array(rig.hands, dtype=np.int64),
         np.array(rig.hand_change).reshape(-1, 4),
         skull,
@@ -165,12 +178,15 @@ def body_parts(
     )
 
 
-def _trunk_joints(performer: Skeleton, source: BodyPlan, chosen: frozenset[int]) -> TrunkJoints:
-    """The joints that show how the performer's trunk and head are turned."""
-    hips = _pair(source.legs)
-    shoulders = _pair(source.arms)
-    seen = source.head[1:] if source.skull is not None else ()
-    seen = () if chosen.isdisjoint(seen) else seen
+def _trunk_joints(bodies: TwoBodies, *, both_legs: bool) -> TrunkJoints:
+    """The joints that show how the performer's trunk and head are turned.
+
+    Who lends one arm only lends no trunk: then none of its joints shows anything.
+    """
+    performer, source, nothing = bodies.performer, bodies.source, np.full(2, -1)
+    hips = _pair(source.legs) if bodies.trunk_drives or both_legs else nothing
+    shoulders = _pair(source.arms) if bodies.trunk_drives else nothing
+    seen = source.head[1:] if bodies.head_drives and source.skull is not None else ()
     return TrunkJoints(
         hips=hips,
         shoulders=shoulders,
@@ -219,14 +235,6 @@ def _knuckles(plan: BodyPlan, side: Side) -> tuple[int, int] | None:
         if first and last:
             return first[0], last[0]
     return None
-
-
-def _joined(limb: Limb) -> Chain:
-    """All joints of a limb, from the trunk outward."""
-    chain = list(limb.upper)
-    for segment in (limb.lower, limb.end):
-        chain.extend(segment[1:])
-    return tuple(chain)
 
 
 def _bends(limb: Limb) -> tuple[int, int, int, int]:

@@ -2,22 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.skeleton import Skeleton
-from runtime.driving.body.body_parts import Leg
+from runtime.driving.body.body_parts import BodyParts, TwoBodies
+from runtime.driving.body.joint_turns import about_vertical
 from runtime.driving.performer import Pose
+from runtime.driving.root_motion import chain_length
 from solvers.retarget.clearance import STANDS, clearance
 from solvers.retarget.foot_contacts import FootContacts, FootContactsState
 from solvers.retarget.foot_lock import FootLock, FootLockState
 from solvers.retarget.sole_pitch import SolePitch, SolePitchState
-from solvers.retarget.trunk_turns import TrunkJoints
 from solvers.retarget.two_bone_ik import two_bone_turns
-from solvers.skeleton.quaternions import multiply
+from solvers.skeleton.quaternions import multiply, rotate
 
 Array = NDArray[np.float64]
 Place = Callable[[Array], Array]
@@ -46,30 +46,18 @@ class Footing:
     """The feet of a character with F legs that are driven.
 
     Args:
-        performer: the performer's skeleton.
-        upright: (J, 3) [m] the performer standing upright, turned as the character faces.
-        nodes: (K, 3) [m] the character's nodes at rest.
-        legs: the legs that correspond.
-        body: joints of trunk, arms and legs, which may rest on the floor too.
-        trunk: joints that show how high the trunk is.
-        forward: (3,) where the character looks at rest.
+        bodies: the performer and the character.
+        parts: their corresponding parts.
     """
 
-    def __init__(
-        self,
-        performer: Skeleton,
-        upright: Array,
-        nodes: Array,
-        legs: Sequence[Leg],
-        body: Sequence[int],
-        trunk: TrunkJoints,
-        forward: Array,
-    ) -> None:
-        rest = performer.rest_positions
-        self._legs = legs
-        self._body = np.array(body, dtype=np.int64)
+    def __init__(self, bodies: TwoBodies, parts: BodyParts) -> None:
+        rest, nodes = bodies.performer.rest_positions, bodies.tree.positions
+        self._legs = legs = parts.legs
+        own = {joint for leg in legs for joint in leg.source[2:]}
+        body = {joint for part in parts.parts for joint in part.source} - own
+        self._body = np.array(sorted(body), dtype=np.int64)
         hips = np.array([leg.source[0] for leg in legs], dtype=np.int64)
-        shoulders = trunk.shoulders[trunk.shoulders >= 0]
+        shoulders = parts.trunk.shoulders[parts.trunk.shoulders >= 0]
         self._heights_of = hips, shoulders if len(shoulders) else hips
         self._stood = np.full(2, np.nan)
         self._parts = np.array([leg.source[2:] for leg in legs], dtype=np.int64).reshape(-1, 2)
@@ -77,18 +65,20 @@ class Footing:
         self._joints = np.array([leg.target[:3] for leg in legs], dtype=np.int64).reshape(-1, 3)
         self._points = np.array([leg.target[2:] for leg in legs], dtype=np.int64).reshape(-1, 2)
         self._segments = np.array([leg.segments for leg in legs], dtype=np.int64).reshape(-1, 3)
-        lengths = [_length(nodes, leg.target[:3]) for leg in legs]
-        theirs = [_length(rest, leg.source[:3]) for leg in legs]
         self._stature = float(np.ptp(rest[:, 1]))
-        self._contacts = FootContacts(rest[self._parts, 1], float(np.mean(theirs)) if legs else 1.0)
+        lengths = [chain_length(nodes, leg.target[:3]) for leg in legs]
+        theirs = [chain_length(rest, leg.source[:3]) for leg in legs]
+        leg, their_leg = (float(np.mean(each or [1.0])) for each in (lengths, theirs))
+        self._contacts = FootContacts(rest[self._parts, 1], their_leg)
         self._lock = FootLock(np.array(lengths))
         ours = nodes[self._points[:, 1]] - nodes[self._points[:, 0]]
-        pointless = np.linalg.norm(ours, axis=1) < _SHORT * np.mean(lengths) if legs else slice(0)
-        ours[pointless] = _FOOT * float(np.mean(lengths or [1.0])) * forward
-        standing = upright[self._parts[:, 1]] - upright[self._parts[:, 0]]
-        ratio = float(np.mean(lengths)) / max(float(np.mean(theirs)), 1e-9) if legs else 1.0
-        standing = np.where(self._has_toes[:, None], standing, ours / ratio)
-        self._soles = SolePitch(ours, standing, self._has_toes)
+        front = rotate(about_vertical(bodies.facing), np.array([0.0, 0.0, 1.0]))
+        ours[np.linalg.norm(ours, axis=1) < _SHORT * leg] = _FOOT * leg * front
+        standing = bodies.upright[self._parts[:, 1]] - bodies.upright[self._parts[:, 0]]
+        alike = ours * their_leg / max(leg, 1e-9)
+        self._soles = SolePitch(
+            ours, np.where(self._has_toes[:, None], standing, alike), self._has_toes
+        )
 
     def watch(self, pose: Pose) -> None:
         """Find out which parts of the performer's feet stand."""
@@ -196,7 +186,3 @@ class Footing:
         self._lock.restore(state.lock)
         self._soles.restore(state.soles)
         self._stood = state.stood
-
-
-def _length(points: Array, chain: tuple[int, ...]) -> float:
-    return float(np.linalg.norm(np.diff(points[list(chain)], axis=0), axis=1).sum())

@@ -39,11 +39,6 @@ class RigBuilder:
         self.hands: list[int] = []
         self.hand_change: list[Array] = []
 
-    @property
-    def segments(self) -> int:
-        """How many segments there are."""
-        return len(self._near)
-
     def drive_of(self, limbs: Iterable[Limb], least_upright: float) -> str:
         """How a pair of limbs is driven: relative if it stands on the floor, and bends at rest.
 
@@ -84,14 +79,28 @@ class RigBuilder:
         source_knuckles: tuple[int, int] | None,
         target_knuckles: tuple[int, int] | None,
         drive: str,
-    ) -> None:
-        """Let an arm follow an arm, its hand a hand.
+    ) -> tuple[int, ...]:
+        """Let an arm follow an arm, its hand a hand; return the numbers of its segments.
 
         A foreleg turns from where it stands as an arm turns from hanging down.
         """
+        first = len(self._near)
         last = self._follow(theirs, ours, drive, None)
-        if not (ours.end and theirs.end):
-            return
+        if ours.end and theirs.end:
+            hand = self._add_hand(theirs, ours, source_knuckles, target_knuckles)
+            if ours.lower:
+                self._twisted_by[last] = hand
+                self._take_beside(ours, hand)
+        return tuple(range(first, len(self._near)))
+
+    def _add_hand(
+        self,
+        theirs: Limb,
+        ours: Limb,
+        source_knuckles: tuple[int, int] | None,
+        target_knuckles: tuple[int, int] | None,
+    ) -> int:
+        """Let a hand follow by its knuckles, else by the wrist's rotation; return its number."""
         hand = self._add(ours.end, theirs.end[0], theirs.end[-1])
         frame = self._hand_at_rest(self._rest, ours.end, target_knuckles)
         if source_knuckles:
@@ -100,9 +109,7 @@ class RigBuilder:
             self.hands[hand] = theirs.end[0]
             theirs_at_rest = self._hand_at_rest(self._upright, theirs.end, None)
             self.hand_change[hand] = multiply(theirs_at_rest, conjugate(frame))
-        if ours.lower:
-            self._twisted_by[last] = hand
-            self._take_beside(ours, hand)
+        return hand
 
     def _hand_at_rest(self, points: Array, hand: Chain, knuckles: tuple[int, int] | None) -> Array:
         """The orientation (4,) of a hand at rest; without knuckles its palm looks down or inward.

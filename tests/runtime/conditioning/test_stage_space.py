@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from scipy.spatial.transform import Rotation
 
 from devices.errors import InputError
 from devices.skeleton import SkeletonFrame
@@ -17,7 +18,7 @@ from replay.builtin import builtin_recording
 from replay.formats import read_recording
 from runtime.conditioning.body_anatomy import body_anatomy
 from runtime.conditioning.conditioner import Conditioner
-from runtime.conditioning.mirror import mirrored
+from runtime.conditioning.mirror import mirrored, mirrored_rotations
 from runtime.conditioning.switches import (
     SWITCHES,
     Conditioning,
@@ -140,6 +141,21 @@ def test_a_tilted_and_lowered_floor_is_made_level() -> None:
             np.testing.assert_allclose(heights, 0.0, atol=0.06)
             up = out.positions[BODY.index("Head")] - out.positions[BODY.index("SpineBase")]
             assert up[1] / np.linalg.norm(up) > np.cos(0.05)
+    tilted = np.full((3, 4), np.nan)
+    tilted[:2] = Rotation.from_matrix(turn).as_quat()
+    level = conditioner.levelling.level_rotations(tilted)
+    assert np.abs(Rotation.from_quat(level[:2]).as_matrix()[:, 1, 1]).min() > np.cos(0.05)
+    assert np.isnan(level[2]).all()
+
+
+@given(st.integers(0, 1000))
+def test_rotations_are_mirrored_as_positions_are(seed: int) -> None:
+    turns = Rotation.random(2, random_state=seed)
+    points = np.random.default_rng(seed).normal(size=(2, 3))
+    other = np.array([1, 0])
+    seen = Rotation.from_quat(mirrored_rotations(turns.as_quat(), other))
+    wanted = mirrored(turns.apply(points), other)
+    np.testing.assert_allclose(seen.apply(mirrored(points, other)), wanted, atol=1e-12)
 
 
 def test_a_jump_does_not_raise_the_floor() -> None:

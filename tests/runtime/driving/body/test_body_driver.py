@@ -57,15 +57,20 @@ def body(turn: float = 0.0, droop: float = 0.0) -> Character:
     return replace(figure, plan=plan_by_names(skeleton))
 
 
+CHARACTERS: dict[BodyDriver, Character] = {}
+
+
 def driver_of(character: Character) -> BodyDriver:
-    return BodyDriver(paired(Puppet(character)))
+    driver = BodyDriver(paired(Puppet(character)))
+    CHARACTERS[driver] = character
+    return driver
 
 
 def follow(driver: BodyDriver, *poses: ArrayLike, rate: float = 30.0) -> list[PosedNodes]:
     """The posed nodes on the stage for poses of a performer who first stands at rest."""
     performer = Performer(BODY)
     driver.prepare((), rest_state(performer.follow(frame(pose(), 0.0)), heading=0.0))
-    puppet = Puppet(driver_character(driver))
+    puppet = Puppet(CHARACTERS[driver])
     puppet.drive_with(driver)
     nodes = []
     for number, positions in enumerate(poses):
@@ -74,10 +79,6 @@ def follow(driver: BodyDriver, *poses: ArrayLike, rate: float = 30.0) -> list[Po
         assert motion.nodes is not None
         nodes.append(motion.nodes)
     return nodes
-
-
-def driver_character(driver: BodyDriver) -> Character:
-    return driver._character
 
 
 def errors(
@@ -275,3 +276,17 @@ def test_only_the_chosen_part_of_the_performer_drives() -> None:
     driver = best_driver(replace(whole, joints=arm))
     assert [part.name for part in driver.parts] == ["left arm"]
     assert str(driver.parts[0]) == "left arm -> left arm, absolute, 100 %"
+
+
+def test_who_lends_one_arm_turns_no_trunk() -> None:
+    whole = paired(Puppet(body()))
+    arm = tuple(BODY.index(f"{name}Left") for name in ("Shoulder", "Elbow", "Wrist", "Hand"))
+    driver = BodyDriver(replace(whole, joints=arm))
+    performer = Performer(BODY)
+    driver.prepare((), rest_state(performer.follow(frame(pose(), 0.0)), heading=0.0))
+    twisted = pose({"SpineMid": (0.3, 0.8, 0.0), "ShoulderLeft": (0.0, 0.0, 0.6)})
+    targets = driver.targets(performer.follow(frame(twisted, 0.1)))
+    assert targets.nodes is not None
+    turned_by = Rotation.from_quat(targets.nodes.rotations).magnitude()
+    assert turned_by[[node("pelvis"), node("chest"), node("head"), node("wrist.R")]].max() < 1e-9
+    assert turned_by[node("shoulder.L")] > 0.3
