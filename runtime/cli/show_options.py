@@ -64,6 +64,7 @@ def add_show_options(parser: argparse.ArgumentParser) -> None:
     _add_stage(parser)
     _add_remote(parser)
     _add_conditioning(parser)
+    _add_driving(parser)
     _add_match(parser)
     _add_deformation(parser)
     _add_files(parser)
@@ -224,16 +225,16 @@ def _add_conditioning(parser: argparse.ArgumentParser) -> None:
         stream.add_argument(f"--{name}", action=argparse.BooleanOptionalAction, help=text)
 
 
-def _add_match(parser: argparse.ArgumentParser) -> None:
-    match = parser.add_argument_group("matching the performer to the characters")
-    match.add_argument(
+def _add_driving(parser: argparse.ArgumentParser) -> None:
+    drive = parser.add_argument_group("who drives, and how the characters follow")
+    drive.add_argument(
         "--source",
         default="whole",
         metavar="PRESET|JOINTS",
         help="the part of the performer that drives: whole, upper, arms, legs, left-arm, "
         "right-arm, hand, ... or joint names separated by commas (default whole)",
     )
-    match.add_argument(
+    drive.add_argument(
         "--drive",
         choices=DRIVES,
         default="auto",
@@ -241,18 +242,25 @@ def _add_match(parser: argparse.ArgumentParser) -> None:
         "relative turns matched chains from a rest pose, auto (default) is absolute where both "
         "have such limbs",
     )
-    match.add_argument(
+    drive.add_argument(
         "--in-place",
         action="store_true",
         help="let characters stay where they are; else they travel as their performers do",
     )
-    match.add_argument(
+    drive.add_argument(
         "--performers",
         type=counting,
         default=1,
         metavar="N",
         help="number of performers: performer K drives character K, and the last performer also "
         "drives all remaining characters (default 1)",
+    )
+
+
+def _add_match(parser: argparse.ArgumentParser) -> None:
+    match = parser.add_argument_group(
+        "matching chains of the performer to the characters",
+        "All but --iterations choose matched chains also for bodies that would follow limb by limb.",
     )
     match.add_argument(
         "--match",
