@@ -260,7 +260,7 @@ def _add_driving(parser: argparse.ArgumentParser) -> None:
 def _add_match(parser: argparse.ArgumentParser) -> None:
     match = parser.add_argument_group(
         "matching chains of the performer to the characters",
-        "All but --iterations choose matched chains also for bodies that would follow limb by limb.",
+        "All but --iterations choose matched chains also for bodies that else follow limb by limb.",
     )
     match.add_argument(
         "--match",
