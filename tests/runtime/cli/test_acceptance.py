@@ -128,7 +128,9 @@ def test_damaged_files_perform_or_are_refused_in_one_line(
         told = capsys.readouterr().err
         if code == 0:
             assert np.isfinite(np.frombuffer(cache.read_bytes(), "<f4", offset=32)).all()
-            assert json.loads(report.read_text())["stretch"]["p99"] < 1.0
+            told_of = json.loads(report.read_text())
+            few = told_of["character"]["vertices"] < 100  # a box has no edge that could be spared
+            assert told_of["stretch"]["p99"] < (1.0 if few else 0.5)
         else:
             assert (code, told.count("\n")) == (2, 1)
             assert told.startswith("bunraku: error: ")
