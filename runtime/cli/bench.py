@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from devices.errors import InputError
-from runtime.cli.arguments import positive
+from runtime.cli.options.arguments import positive
 from runtime.show.settings import DRIVES
 
 HELP = "measure the speed of this machine"

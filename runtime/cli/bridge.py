@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from devices.errors import InputError
-from runtime.cli.arguments import positive
+from runtime.cli.options.arguments import positive
 from runtime.show.interrupts import interrupts_deferred
 
 if TYPE_CHECKING:

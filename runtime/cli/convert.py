@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from runtime.cli.arguments import positive, whole
+from runtime.cli.options.arguments import positive, whole
 
 HELP = "convert a recording to another format"
 

@@ -6,7 +6,7 @@ import argparse
 import os
 import sys
 
-from runtime.cli.show_options import add_character_option, add_show_options
+from runtime.cli.options.show_options import add_character_option, add_show_options
 
 HELP = "play the built-in show with the built-in characters"
 

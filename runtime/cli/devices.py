@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from runtime.cli.arguments import positive
+from runtime.cli.options.arguments import positive
 
 HELP = "list connected devices, arriving data and taken ports"
 

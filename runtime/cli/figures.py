@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from runtime.cli.arguments import size
-from runtime.cli.show_options import add_character_option
+from runtime.cli.options.arguments import size
+from runtime.cli.options.show_options import add_character_option
 
 HELP = "draw the paper's figures on squash and stretch"
 

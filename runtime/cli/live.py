@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from runtime.cli.show_options import add_character_option, add_show_options
+from runtime.cli.options.show_options import add_character_option, add_show_options
 
 HELP = "drive characters with a live performer"
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from devices.stream import SkeletonStream
 from replay.player import Player
 from runtime.characters.open_character import load_character
-from runtime.cli.show_options import show_settings
+from runtime.cli.options.show_options import show_settings
 from runtime.cli.warm import warm_up
 from runtime.show import messages
 from runtime.show.collector_pauses import collector_paused

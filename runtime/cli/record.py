@@ -9,7 +9,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from runtime.cli.arguments import positive
+from runtime.cli.options.arguments import positive
 from runtime.show.interrupts import interrupts_deferred
 
 if TYPE_CHECKING:

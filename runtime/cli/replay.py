@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from runtime.cli.show_options import add_character_option, add_show_options
+from runtime.cli.options.show_options import add_character_option, add_show_options
 
 HELP = "drive characters with a recording"
 

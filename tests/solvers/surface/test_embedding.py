@@ -179,7 +179,7 @@ def test_singles_are_doubles_rounded():
 
 
 def test_threads_change_nothing_and_nothing_is_allocated():
-    vertices, faces, _ = tube(120, 60)
+    vertices, faces, _ = tube(240, 120)
     surface, rest, _ = follower(vertices, faces, 700)
     moved, out, alone = bent(rest, 0.3), np.empty_like(vertices), np.empty_like(vertices)
     before = numba.get_num_threads()

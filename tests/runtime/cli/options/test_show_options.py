@@ -9,7 +9,8 @@ import pytest
 
 from devices.errors import InputError
 from runtime.cli import parser
-from runtime.cli.show_options import show_settings
+from runtime.cli.options.output_options import file_settings
+from runtime.cli.options.show_options import show_settings
 from runtime.render.background import NOTHING, Background
 from runtime.show.settings import (
     CharacterSettings,
@@ -105,7 +106,10 @@ def test_no_field_of_the_settings_is_forgotten() -> None:
         MatchSettings: {"rehearse", "patience"},
         FileSettings: {"takes"},
     }
-    source = Path(str(show_settings.__code__.co_filename)).read_text(encoding="utf-8")
+    source = "".join(
+        Path(str(made.__code__.co_filename)).read_text(encoding="utf-8")
+        for made in (show_settings, file_settings)
+    )
     for kind in (
         ShowSettings, MatchSettings, CharacterSettings, FileSettings, SenderSettings
     ):  # fmt: skip

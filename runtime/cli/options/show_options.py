@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from devices.errors import InputError
-from runtime.cli.arguments import (
+from runtime.cli.options.arguments import (
     colour,
     counting,
     gain,
-    host_port,
     port_number,
     positive,
     remote_address,
@@ -19,16 +18,20 @@ from runtime.cli.arguments import (
     size,
     stiffness,
 )
+from runtime.cli.options.output_options import (
+    add_file_options,
+    add_sender_options,
+    file_settings,
+    sender_settings,
+)
 from runtime.conditioning.switches import SWITCHES
 from runtime.render.background import NOTHING, Background
 from runtime.show.settings import (
     DRIVES,
     ENERGIES,
     CharacterSettings,
-    FileSettings,
     MatchSettings,
     RemoteSettings,
-    SenderSettings,
     ShowSettings,
 )
 
@@ -67,8 +70,8 @@ def add_show_options(parser: argparse.ArgumentParser) -> None:
     _add_driving(parser)
     _add_match(parser)
     _add_deformation(parser)
-    _add_files(parser)
-    _add_other_programs(parser)
+    add_file_options(parser)
+    add_sender_options(parser)
 
 
 def show_settings(options: argparse.Namespace, origin: str) -> ShowSettings:
@@ -107,22 +110,8 @@ def show_settings(options: argparse.Namespace, origin: str) -> ShowSettings:
         conditioning={
             name: getattr(options, name) for name in SWITCHES if getattr(options, name) is not None
         },
-        files=FileSettings(
-            video=options.video,
-            frames=options.frames,
-            cache=options.cache,
-            report=options.report,
-            record=options.record,
-            export=options.export,
-        ),
-        senders=SenderSettings(
-            virtual_camera=options.virtual_camera,
-            ndi=options.ndi,
-            spout=options.spout,
-            vmc=options.vmc,
-            publish=options.publish,
-            publish_keys=options.publish_keys,
-        ),
+        files=file_settings(options),
+        senders=sender_settings(options),
         remote=_remote(options),
         origin=origin,
     )
@@ -329,74 +318,4 @@ def _add_deformation(parser: argparse.ArgumentParser) -> None:
         action="append",
         choices=ENERGIES,
         help="what the solver keeps as rigid as possible (default spokes); see docs/deformation.md",
-    )
-
-
-def _add_files(parser: argparse.ArgumentParser) -> None:
-    keep = parser.add_argument_group("files to write")
-    keep.add_argument(
-        "--video",
-        type=Path,
-        metavar="OUT.mp4",
-        help="the pictures as a video: mp4, m4v, mov, mkv or webm",
-    )
-    keep.add_argument(
-        "--fps",
-        type=positive,
-        default=60.0,
-        metavar="X",
-        help="pictures per second of videos and cameras, at most (default 60; demo 30)",
-    )
-    keep.add_argument("--frames", type=Path, metavar="DIR", help="a PNG of each frame")
-    keep.add_argument(
-        "--cache", type=Path, metavar="OUT.pc2", help="the deformed vertices of each frame"
-    )
-    keep.add_argument(
-        "--report", type=Path, metavar="OUT.json", help="match, times and quality in figures"
-    )
-    keep.add_argument(
-        "--record", type=Path, metavar="OUT.mcap", help="the performer's frames as they arrived"
-    )
-    keep.add_argument(
-        "--export",
-        type=Path,
-        metavar="OUT.{glb,usdc,usda,bvh}",
-        help="the performed character, for other programs",
-    )
-
-
-def _add_other_programs(parser: argparse.ArgumentParser) -> None:
-    send = parser.add_argument_group("sending to other programs")
-    send.add_argument(
-        "--virtual-camera",
-        nargs="?",
-        const="",
-        metavar="NAME",
-        help="send the pictures to this virtual camera, or to the first one if NAME is missing",
-    )
-    send.add_argument(
-        "--ndi", metavar="NAME", help="send the pictures over the network under this NDI name"
-    )
-    send.add_argument(
-        "--spout",
-        metavar="NAME",
-        help="share the pictures with programs on this machine by Spout (Windows) or Syphon "
-        "(macOS)",
-    )
-    send.add_argument(
-        "--vmc",
-        type=host_port,
-        metavar="HOST:PORT",
-        help="send the first performer as VMC (default port 39539)",
-    )
-    send.add_argument(
-        "--publish",
-        metavar="tcp://HOST:PORT",
-        help="publish the performers for other shows, which open zmq+tcp://HOST:PORT",
-    )
-    send.add_argument(
-        "--publish-keys",
-        type=Path,
-        metavar="DIR",
-        help="keys for --publish to other machines; `bunraku bridge --make-keys DIR` makes them",
     )
