@@ -18,8 +18,14 @@ from replay.leap.reader import read_leap, recognises_leap
 from replay.mcap.reader import read_mcap, recognises_mcap
 from replay.mediapipe.reader import read_mediapipe, recognises_mediapipe
 from replay.recording import Recording
+from replay.stated import UNSTATED, Stated
+from replay.text_file import decoded
 
 HEAD_BYTES = 4096
+JSON_HEAD_BYTES = 1 << 20
+"""JSON may begin with anything: with the names of 478 points of a face, with a list of labels."""
+
+_OPENING = tuple("{[")
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,27 +34,55 @@ class RecordingFormat:
 
     Attributes:
         name: its name in `bunraku info`.
-        recognises: whether a file has this format, from its path and first `HEAD_BYTES` bytes.
-        read: reads the file; raises InputError that names the file and the fault.
+        recognises: whether a file has this format, from its path and first bytes, in UTF-8 where
+            it is text.
+        reader: reads the file, and takes what is stated of its unit and axes; raises InputError
+            that names the file and the fault.
     """
 
     name: str
     recognises: Callable[[Path, bytes], bool]
-    read: Callable[[Path], Recording]
+    reader: Callable[[Path, Stated], Recording]
+
+    def read(self, path: Path, stated: Stated = UNSTATED) -> Recording:
+        """Read the file at `path`; what is stated of it comes before what is guessed.
+
+        Raises:
+            InputError: the file is damaged, or it leaves nothing open that is stated.
+        """
+        return stated.applied(self.reader(path, stated))
+
+
+def _certain(read: Callable[[Path], Recording]) -> Callable[[Path, Stated], Recording]:
+    """The reader of a format that says itself which unit and axes it has."""
+
+    def reader(path: Path, stated: Stated) -> Recording:
+        for option, value in (("--unit-input", stated.unit), ("--up-input", stated.up)):
+            if value is not None:
+                raise InputError(
+                    f"{path}: {option} says what its format says already; leave it out"
+                )
+        return read(path)
+
+    return reader
 
 
 def formats() -> tuple[RecordingFormat, ...]:
     """Return every readable format, the most certain to recognise first."""
     return (
-        RecordingFormat("Bunraku recording (MCAP)", recognises_mcap, read_mcap),
-        RecordingFormat("Bunraku table (CSV)", recognises_joint_table, read_joint_table),
-        RecordingFormat("Leap Motion messages", recognises_leap, read_leap),
+        RecordingFormat("Bunraku recording (MCAP)", recognises_mcap, _certain(read_mcap)),
+        RecordingFormat("Bunraku table (CSV)", recognises_joint_table, _certain(read_joint_table)),
+        RecordingFormat("Leap Motion messages", recognises_leap, _certain(read_leap)),
         RecordingFormat("MediaPipe landmarks", recognises_mediapipe, read_mediapipe),
-        RecordingFormat("Azure Kinect joints (CSV)", recognises_azure_csv, read_azure_csv),
-        RecordingFormat("Kinect v2, Labanotation Suite (CSV)", recognises_laban, read_laban),
-        RecordingFormat("Kinect v2, NTU RGB+D (.skeleton)", recognises_ntu, read_ntu),
-        RecordingFormat("Kinect v1, UTKinect-Action3D", recognises_ut, read_ut),
-        RecordingFormat("Kinect v1, MSR Action3D", recognises_msr, read_msr),
+        RecordingFormat(
+            "Azure Kinect joints (CSV)", recognises_azure_csv, _certain(read_azure_csv)
+        ),
+        RecordingFormat(
+            "Kinect v2, Labanotation Suite (CSV)", recognises_laban, _certain(read_laban)
+        ),
+        RecordingFormat("Kinect v2, NTU RGB+D (.skeleton)", recognises_ntu, _certain(read_ntu)),
+        RecordingFormat("Kinect v1, UTKinect-Action3D", recognises_ut, _certain(read_ut)),
+        RecordingFormat("Kinect v1, MSR Action3D", recognises_msr, _certain(read_msr)),
         RecordingFormat("BVH", recognises_bvh, read_bvh),
     )
 
@@ -61,7 +95,10 @@ def recognise(path: Path) -> RecordingFormat:
     """
     try:
         with path.open("rb") as file:
-            head = file.read(HEAD_BYTES)
+            head = _as_utf_8(file.read(HEAD_BYTES))
+            if head.lstrip()[:1].decode("latin-1") in _OPENING:
+                file.seek(0)
+                head = _as_utf_8(file.read(JSON_HEAD_BYTES))
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror or error}") from error
     if not head:
@@ -73,10 +110,16 @@ def recognise(path: Path) -> RecordingFormat:
     raise InputError(f"{path} is not a recording that can be read; known formats: {known}")
 
 
-def read_recording(path: Path) -> Recording:
+def _as_utf_8(head: bytes) -> bytes:
+    """The first bytes of a file in UTF-8 if they are UTF-16, else as they are."""
+    is_utf_16 = head[:2] in (b"\xff\xfe", b"\xfe\xff") or head[1:4:2] == b"\0\0"
+    return decoded(head[: len(head) & -2]).encode() if is_utf_16 else head
+
+
+def read_recording(path: Path, stated: Stated = UNSTATED) -> Recording:
     """Read the recording in the file at `path`, of any known format.
 
     Raises:
         InputError: see `recognise` and the readers.
     """
-    return recognise(path).read(path)
+    return recognise(path).read(path, stated)

@@ -78,6 +78,43 @@ def legs_hang(skeleton: Skeleton, parts: Sequence[BodyPart | None], pose: Array,
     return True
 
 
+def rises(skeleton: Skeleton, parts: Sequence[BodyPart | None], pose: Array, up: Array) -> bool:
+    """Whether a pose (J, 3) stands along an axis: its legs hang, and its head is not below."""
+    spine = _between(_place(skeleton, parts, Kind.HIPS), _head(skeleton, parts), pose[None])
+    level = spine is None or spine[0] @ up >= -0.5 * np.linalg.norm(spine[0])
+    return bool(level) and legs_hang(skeleton, parts, pose, up)
+
+
+def hips_at_leg_height(
+    skeleton: Skeleton, parts: Sequence[BodyPart | None], positions: Array, up: Array
+) -> bool:
+    """Whether the hips keep about a leg's length above the origin, as in somebody who walks.
+
+    Args:
+        skeleton: of `positions`.
+        parts: its labels.
+        positions: (T, J, 3) as the file has them, its floor at the origin.
+        up: (3,) unit vector.
+    """
+    frames = _sampled(positions)
+    legs = [
+        _between(
+            _place(skeleton, parts, Kind.FOOT, side),
+            _place(skeleton, parts, Kind.UPPER_LEG, side),
+            frames,
+        )
+        for side in _SIDES
+    ]
+    lengths = [np.linalg.norm(leg, axis=1) for leg in legs if leg is not None]
+    hips = _place(skeleton, parts, Kind.HIPS)
+    if hips is None or not lengths:
+        return False
+    leg, height = np.nanmax(lengths), frames[:, hips] @ up
+    height = height[np.isfinite(height)]
+    low, high = (np.percentile(height, (10, 90)) / max(leg, 1e-12)) if height.size else (0.0, 0.0)
+    return bool(low > 0.5 and high < 1.6)
+
+
 def standing_axis(
     skeleton: Skeleton, parts: Sequence[BodyPart | None], positions: Array
 ) -> Array | None:

@@ -60,6 +60,28 @@ def heading_joints(skeleton: Skeleton) -> list[tuple[int, int]]:
     return pairs
 
 
+def partners(skeleton: Skeleton, parts: Sequence[BodyPart | None]) -> NDArray[np.int64]:
+    """Return the same joint (J,) of the other side; a joint in the middle is its own.
+
+    Args:
+        skeleton: the joints.
+        parts: its labels.
+    """
+    partner = np.arange(len(parts))
+    of_side: dict[Side, dict[tuple[Kind, bool, str, int | None], list[int]]] = {
+        side: {} for side in _SIDED
+    }
+    for joint in skeleton.order:
+        part = parts[joint]
+        if part is not None and part.side in of_side:
+            key = part.kind, part.tip, part.word, part.number
+            of_side[part.side].setdefault(key, []).append(joint)
+    for key, left in of_side[Side.LEFT].items():
+        for a, b in zip(left, of_side[Side.RIGHT].get(key, []), strict=False):
+            partner[a], partner[b] = b, a
+    return partner
+
+
 def hips_joint(skeleton: Skeleton) -> int:
     """Return the joint that carries the body: the hips, else the skeleton's root.
 

@@ -16,13 +16,16 @@ from replay.bvh.text import BvhJoint, read_bvh_text
 from replay.orientation import (
     body_height,
     floor_and_start,
+    hips_at_leg_height,
     legs_hang,
+    rises,
     stands_upright,
     up_axis,
     up_to_y,
     yaw_to_front,
 )
 from replay.recording import Recording
+from replay.stated import UNSTATED, Stated
 from solvers.skeleton.quaternions import followed_by
 
 Array = NDArray[np.float64]
@@ -45,14 +48,14 @@ def recognises_bvh(path: Path, head: bytes) -> bool:
     return start[:9].upper() == b"HIERARCHY" or path.suffix.lower() == ".bvh"
 
 
-def read_bvh(path: Path) -> Recording:
+def read_bvh(path: Path, stated: Stated = UNSTATED) -> Recording:
     """Read a BVH file and convert it to metres, +Y up, facing +Z.
 
     Rotations are joint to world and identity in the file's zero pose, up to the rotation of the
     whole recording. End sites become joints with their parent's name and "_end". Rest positions are
     the zero pose, levelled on its own, or the first frame if the zero pose is unusable. Several
     roots are joined under one. Unit, up axis and heading are guessed from the body (see
-    `replay.orientation`), and noted.
+    `replay.orientation`), and noted; `stated` decides unit and up axis instead.
 
     Raises:
         InputError: the file is not BVH, or is damaged; the message gives the line.
@@ -69,7 +72,7 @@ def read_bvh(path: Path) -> Recording:
         names = [_free_name("root", names), *names]
         parents = [-1, *(parent + 1 for parent in parents)]
     skeleton = Skeleton(tuple(names), np.array(parents), rest)
-    positions, rotations, rest = _canonical(skeleton, positions, rotations, notes)
+    positions, rotations, rest = _canonical(skeleton, positions, rotations, stated, notes)
     seen = np.isfinite(positions).all(axis=2)
     if not seen.any():
         raise InputError(f"{path}: no joint has a usable position in any frame")
@@ -131,26 +134,26 @@ def _under_one_root(
 
 
 def _canonical(
-    skeleton: Skeleton, positions: Array, rotations: Array, notes: list[str]
+    skeleton: Skeleton, positions: Array, rotations: Array, stated: Stated, notes: list[str]
 ) -> tuple[Array, Array, Array]:
     """Positions, rotations and rest positions in metres, +Y up, facing +Z, on the floor."""
     parts = label_joints(skeleton)
-    rest = skeleton.rest_positions
-    up = up_axis(skeleton, parts, positions, rest)
+    up = stated.up_axis
     if up is None:
-        up = np.array([0.0, 1.0, 0.0])
-        notes.append("up axis taken as +Y: no legs or head are known by name")
-    elif up[1] != 1.0:
-        notes.append(f"up axis is {'-+'[int(up.sum() > 0)]}{'XYZ'[int(np.argmax(np.abs(up)))]}")
-    person = stands_upright(skeleton, parts, positions, up)
-    height = body_height(skeleton, parts, rest) if person else None
-    size = float(np.ptp(rest, axis=0).max())
-    scale = _metres(height, size, notes)
+        up = _up(skeleton, positions, notes)
+    person = stands_upright(skeleton, parts, positions, up) or stands_upright(
+        skeleton, parts, skeleton.rest_positions[None], up
+    )
+    posed = _median_pose(positions)
+    height = body_height(skeleton, parts, posed) if person else None
+    scale = stated.metres or _metres(height, float(np.ptp(posed, axis=0).max()), notes)
     turn = up_to_y(up)
     moved = positions @ (scale * turn.T)
     yaw = yaw_to_front(skeleton, moved)
     if yaw is None:
-        notes.append("heading unchanged: no left and right hips or shoulders are known by name")
+        notes.append(
+            "heading unchanged: no left and right hips or shoulders are known, seen from above"
+        )
     else:
         moved, turn = moved @ yaw.T, yaw @ turn
     moved -= floor_and_start(moved, hips_joint(skeleton))
@@ -159,20 +162,62 @@ def _canonical(
     return moved, turned, _rest(skeleton, scale, moved, notes)
 
 
+def _up(skeleton: Skeleton, positions: Array, notes: list[str]) -> Array:
+    """The up axis of the file: of the zero pose if that stands, else of the motion.
+
+    People who crawl, lie or stand on their hands stay so. Where somebody walks upright along
+    another axis than the zero pose's, with the hips a leg's length above the origin, the file's
+    root turns the body up, and the motion's axis counts.
+    """
+    parts = label_joints(skeleton)
+    rest = skeleton.rest_positions
+    moving = up_axis(skeleton, parts, positions, rest)
+    if moving is None:
+        notes.append("up axis taken as +Y: no legs or head are known by name (--up-input AXIS)")
+        return np.array([0.0, 1.0, 0.0])
+    zero = up_axis(skeleton, parts, rest[None], rest)
+    up = moving
+    if zero is not None and (zero != moving).any() and rises(skeleton, parts, rest, zero):
+        if not hips_at_leg_height(skeleton, parts, positions, moving):
+            up = zero
+        notes.append(
+            f"the zero pose stands along {_axis_name(zero)}, the motion along "
+            f"{_axis_name(moving)}: {_axis_name(up)} is up (--up-input AXIS says otherwise)"
+        )
+    elif up[1] != 1.0:
+        notes.append(f"up axis is {_axis_name(up)} (--up-input AXIS says otherwise)")
+    return up
+
+
+def _axis_name(axis: Array) -> str:
+    return f"{'-+'[int(axis.sum() > 0)]}{'XYZ'[int(np.argmax(np.abs(axis)))]}"
+
+
+def _median_pose(positions: Array) -> Array:
+    """A pose (J, 3) with the bones' usual lengths, wherever a file states them.
+
+    The offsets of some files are zero, and all positions stand in channels.
+    """
+    whole = positions[np.isfinite(positions).all(axis=(1, 2))]
+    return whole[len(whole) // 2] if len(whole) else np.nan_to_num(np.nanmedian(positions, axis=0))
+
+
 def _metres(height: float | None, size: float, notes: list[str]) -> float:
     """Metres per unit of the file, from a person's height, else from the skeleton's size."""
     if height is None or height <= 0:
         for unit, metres, _ in _UNITS[:3]:
             if _CREATURE_SIZES[0] <= size * metres <= _CREATURE_SIZES[1]:
-                notes.append(f"unit guessed: {unit}, {size * metres:.2f} m long")
+                notes.append(
+                    f"unit guessed: {unit}, {size * metres:.2f} m long (--unit-input UNIT)"
+                )
                 return metres
-        notes.append(f"unit unknown, scaled to {_USUAL_HEIGHT} m")
+        notes.append(f"unit unknown, scaled to {_USUAL_HEIGHT} m (--unit-input UNIT)")
         return _USUAL_HEIGHT / size if size > 0 else 1.0
     for unit, metres, (least, most) in _UNITS:
         if least <= height * metres <= most:
-            notes.append(f"unit guessed: {unit}, {height * metres:.2f} m tall")
+            notes.append(f"unit guessed: {unit}, {height * metres:.2f} m tall (--unit-input UNIT)")
             return metres
-    notes.append(f"unit unknown, scaled to a height of {_USUAL_HEIGHT} m")
+    notes.append(f"unit unknown, scaled to a height of {_USUAL_HEIGHT} m (--unit-input UNIT)")
     return _USUAL_HEIGHT / height
 
 

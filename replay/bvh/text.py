@@ -1,8 +1,9 @@
 """Parse BVH text: the hierarchy of joints and the table of channel values, without interpretation.
 
 The format has no standard. The parser accepts the variants found in practice: any white space and
-case, a byte order mark, several roots, joints without end sites, names with blanks, colons and
-dots, frames split over lines, a wrong frame count, a truncated last frame, decimal commas.
+case and encoding, several roots, joints without end sites, names with blanks, colons and dots,
+comments, frames split over lines, a wrong frame count, a truncated last frame, decimal commas,
+minus signs that begin the next number or are those of a typesetter, frame times in milliseconds.
 Source: Meredith and Maddock 2001, "Motion Capture File Formats Explained", section 2.
 """
 
@@ -18,17 +19,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.errors import InputError
+from replay.text_file import file_text
 
-MOST_BYTES = 512 * 2**20
 MOST_JOINTS = 10_000
 MOST_POSES = 20_000_000  # frames times joints
 _LARGEST = 1e7  # largest plausible length or angle
 _USUAL_FRAME_TIME = 1 / 30
+_USUAL_RATES = (10, 12, 15, 20, 24, 25, 30, 48, 50, 60, 72, 75, 90, 100, 120, 144, 200, 240, 250)
+_SLOWEST = 1.5  # [s] a frame; a greater frame time has another unit
 _CHANNEL = re.compile(r"([XYZ])(position|rotation|scale)$", re.IGNORECASE)
 _MOTION = re.compile(r"\}\s*MOTION\b", re.IGNORECASE)
 _TIMING = re.compile(
     r"\s*Frames\s*:?[ \t]*([^\s:]*)\s+Frame\s*Time\s*:?[ \t]*([^\s:]*)", re.IGNORECASE
 )
+_COMMENT = re.compile(r"(?m)(?:^|(?<=\s))(?:#|//).*$")
+_NUMBERS = re.compile(r"(?im)^[ \t]*OFFSET[^\n{}]*")
+_MINUS = str.maketrans(dict.fromkeys("\u2212\u2010\u2011\u2012\u2013\ufe63\uff0d", "-"))
+_GLUED = re.compile(r"(?<=[\d.])-(?=[\d.])")
 _NOT_A_NUMBER = re.compile(r"[-+]?(?:1\.#\w+|nan\(\w*\))", re.IGNORECASE)  # C runtime of Windows
 
 
@@ -72,7 +79,9 @@ def read_bvh_text(path: Path) -> BvhText:
     Raises:
         InputError: the file is unreadable, too large or not BVH; with the line where known.
     """
-    text = _decoded(path)
+    text = file_text(path)
+    if "#" in text or "//" in text:
+        text = _COMMENT.sub("", text)
     motion = _MOTION.search(text)
     if not re.match(r"\s*HIERARCHY\b", text, re.IGNORECASE):
         raise InputError(f"{path}: not a BVH file, it does not begin with HIERARCHY")
@@ -80,14 +89,16 @@ def read_bvh_text(path: Path) -> BvhText:
         raise InputError(
             f"{path}: no MOTION section after the hierarchy; the file may be truncated"
         )
-    joints = _Hierarchy(path, text[: motion.start() + 1]).parse()
+    notes: list[str] = []
+    hierarchy = text[: motion.start() + 1]
+    hierarchy = _NUMBERS.sub(lambda line: _mended(line[0], notes), hierarchy)
+    joints = _Hierarchy(path, hierarchy).parse()
     timing = _TIMING.match(text, motion.end())
     line = 1 + text.count("\n", 0, motion.end())
     if timing is None:
         raise InputError(f"{path}, line {line}: expected 'Frames:' and 'Frame Time:' after MOTION")
-    notes: list[str] = []
     columns = sum(len(joint.channels) for joint in joints)
-    block = text[timing.end() :]
+    block = _mended(text[timing.end() :], notes)
     first_line = 1 + text.count("\n", 0, timing.end())
     values = _table(path, block, columns, first_line, notes)
     if len(values) * len(joints) > MOST_POSES:
@@ -96,28 +107,18 @@ def read_bvh_text(path: Path) -> BvhText:
         )
     if timing[1] != str(len(values)):
         notes.append(f"declares {timing[1] or 'no number of'} frames, holds {len(values)}")
-    return BvhText(joints, values, _frame_time(timing[2], notes), notes)
+    seconds = _frame_time(timing[2], notes)
+    return BvhText(joints, values, seconds, list(dict.fromkeys(notes)))
 
 
-def _decoded(path: Path) -> str:
-    try:
-        if path.stat().st_size > MOST_BYTES:
-            raise InputError(f"{path}: larger than {MOST_BYTES // 2**20} MiB; split the recording")
-        raw = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror or error}") from error
-    for mark, encoding in (
-        (b"\xef\xbb\xbf", "utf-8"),
-        (b"\xff\xfe", "utf-16"),
-        (b"\xfe\xff", "utf-16"),
-    ):
-        if raw.startswith(mark):
-            return raw.decode(encoding, errors="replace").removeprefix("\ufeff").replace("\r", "\n")
-    try:
-        text = raw.decode("utf-8")
-    except UnicodeDecodeError:
-        text = raw.decode("latin-1")
-    return text if "\n" in text else text.replace("\r", "\n")
+def _mended(numbers: str, notes: list[str]) -> str:
+    """The numbers with plain minus signs, each of which begins a number of its own."""
+    if not numbers.isascii():
+        numbers = numbers.translate(_MINUS)
+    parted = _GLUED.sub(" -", numbers) if "-" in numbers else numbers
+    if len(parted) != len(numbers):
+        notes.append("minus signs inside numbers were taken to begin the next number")
+    return parted
 
 
 class _Hierarchy:
@@ -273,14 +274,24 @@ def _numbers(text: str) -> NDArray[np.float64] | None:
 
 
 def _frame_time(word: str, notes: list[str]) -> float:
+    """The frame time [s]; one that no sensor has in seconds is a rate, or has a smaller unit."""
     try:
-        seconds = float(word.replace(",", "."))
+        given = float(word.replace(",", "."))
     except ValueError:
-        seconds = float("nan")
-    if 10.0 <= seconds <= 1000.0:
-        notes.append(f"frame time {word} was taken as frames per second")
-        return 1 / seconds
-    if not 1e-5 <= seconds < 10.0:
-        notes.append(f"frame time {word!r} is unusable; 1/30 s is assumed")
+        given = float("nan")
+    if 1e-5 <= given < _SLOWEST:
+        return given
+    if given in _USUAL_RATES:
+        seconds, meaning = 1 / given, "frames per second"
+    elif _SLOWEST <= given < 1000.0:
+        seconds, meaning = 1e-3 * given, "milliseconds"
+    elif 1000.0 <= given < 1e6:
+        seconds, meaning = 1e-6 * given, "microseconds"
+    else:
+        notes.append(f"frame time {word!r} is unusable; 1/30 s is assumed (--fps-input N)")
         return _USUAL_FRAME_TIME
+    notes.append(
+        f"frame time {word} was taken as {meaning}: {1 / seconds:.4g} frames a second "
+        "(--fps-input N says otherwise)"
+    )
     return seconds

@@ -28,6 +28,7 @@ from replay.mediapipe.landmarks import PersonLandmarks, Tracks, joints_in_metres
 from replay.mediapipe.pose_binary import PoseFile, has_pose_header, parse_pose
 from replay.mediapipe.text import has_landmark_text, parse_landmark_text
 from replay.recording import Recording
+from replay.stated import UNSTATED, Stated
 
 Array = NDArray[np.float64]
 
@@ -42,7 +43,7 @@ def recognises_mediapipe(path: Path, head: bytes) -> bool:
     return has_pose_header(head) or has_landmark_text(head)
 
 
-def read_mediapipe(path: Path) -> Recording:
+def read_mediapipe(path: Path, stated: Stated = UNSTATED) -> Recording:
     """Read the landmarks at `path`.
 
     Raises:

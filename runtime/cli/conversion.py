@@ -14,6 +14,7 @@ from replay.formats import recognise
 from replay.joint_table import write_joint_table
 from replay.mcap.writer import McapWriter
 from replay.recording import Recording
+from replay.stated import UNSTATED, Stated
 from runtime.output.files.whole_file import check_suffix, check_writable, whole_file
 
 
@@ -28,6 +29,7 @@ class Conversion:
         unit: of a BVH file; centimetres if None.
         rate: frames per second of a BVH file; the recording's if None.
         force: replace files that exist.
+        stated: what the recording's file leaves open.
     """
 
     recording: Path
@@ -36,6 +38,7 @@ class Conversion:
     unit: str | None = None
     rate: float | None = None
     force: bool = False
+    stated: Stated = UNSTATED
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +63,7 @@ def convert(options: Conversion) -> Iterator[str]:
     suffix = check_suffix(options.out, tuple(_WRITERS))
     _check_options(options, suffix)
     kind = recognise(options.recording)
-    recording = kind.read(options.recording)
+    recording = kind.read(options.recording, options.stated)
     if options.performer is not None:
         recording = recording.of(options.performer)
     files = _files(options.out, recording)

@@ -6,6 +6,7 @@ import argparse
 from pathlib import Path
 
 from runtime.cli.options.arguments import positive, whole
+from runtime.cli.options.input_options import add_input_options, stated
 
 HELP = "convert a recording to another format"
 
@@ -29,6 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="frames per second of a BVH file (default: the recording's)",
     )
     parser.add_argument("--force", action="store_true", help="replace OUT if it already exists")
+    add_input_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -42,6 +44,7 @@ def run(options: argparse.Namespace) -> int:
         unit=options.unit,
         rate=options.rate,
         force=options.force,
+        stated=stated(options),
     )
     for line in convert(conversion):
         print(line)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from runtime.cli.options.input_options import add_input_options, stated
+
 HELP = "show what a recording or a character contains"
 
 
@@ -13,6 +15,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "file", metavar="FILE", help="a recording, a mesh, a rig, or the name of a built-in one"
     )
+    add_input_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
@@ -26,7 +29,7 @@ def run(options: argparse.Namespace) -> int:
     else:
         path = Path(options.file)
         kind = recognise(path)
-        lines = summary(kind.read(path), path, kind.name)
+        lines = summary(kind.read(path, stated(options)), path, kind.name)
     print("\n".join(lines))
     return 0
 

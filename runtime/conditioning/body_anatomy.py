@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.bodies.joint_labels import label_joints
-from devices.bodies.joint_names import BodyPart, Kind, Side
+from devices.bodies.joint_labels import label_joints, partners
+from devices.bodies.joint_names import BodyPart, Kind
 from devices.skeleton import Skeleton
 
 Array = NDArray[np.float64]
@@ -57,7 +57,7 @@ class BodyAnatomy:
 def body_anatomy(skeleton: Skeleton) -> BodyAnatomy:
     """Find the anatomy of a skeleton by its joint names, or by its shape."""
     parts = label_joints(skeleton)
-    partner, group = _partners(skeleton, parts)
+    partner = partners(skeleton, parts)
     far = [joint for joint in range(len(parts)) if _is_long_bone(skeleton, parts, joint)]
     feet = [
         joint
@@ -68,7 +68,7 @@ def body_anatomy(skeleton: Skeleton) -> BodyAnatomy:
     sole = float(np.clip(height.min(), 0.0, 0.15))
     return BodyAnatomy(
         partner,
-        group,
+        _groups(parts, partner),
         np.array(far, dtype=np.int64),
         skeleton.parents[far].astype(np.int64) if far else np.zeros(0, dtype=np.int64),
         _beyond(skeleton, far),
@@ -77,25 +77,15 @@ def body_anatomy(skeleton: Skeleton) -> BodyAnatomy:
     )
 
 
-def _partners(skeleton: Skeleton, parts: Sequence[BodyPart | None]) -> tuple[Indices, Indices]:
-    """Return `partner` and `group` (J,) of a `BodyAnatomy`."""
-    partner, group = np.arange(len(parts)), np.full(len(parts), -1)
-    of_side: dict[Side, dict[tuple[Kind, bool, str, int | None], list[int]]] = {
-        Side.LEFT: {},
-        Side.RIGHT: {},
-    }
-    for joint in skeleton.order:
+def _groups(parts: Sequence[BodyPart | None], partner: Indices) -> Indices:
+    """Return the `group` (J,) of a `BodyAnatomy`."""
+    group = np.full(len(parts), -1)
+    for joint in np.flatnonzero(partner != np.arange(len(parts))).tolist():
         part = parts[joint]
-        if part is not None and part.side in of_side:
-            key = part.kind, part.tip, part.word, part.number
-            of_side[part.side].setdefault(key, []).append(joint)
-    for key, left in of_side[Side.LEFT].items():
-        kind = key[0]
-        finger = _HAND_GROUP if kind.value.endswith(("finger", "thumb")) else -1
-        for a, b in zip(left, of_side[Side.RIGHT].get(key, []), strict=False):
-            partner[a], partner[b] = b, a
-            group[a] = group[b] = _GROUPS.get(kind, finger)
-    return partner, group
+        assert part is not None
+        finger = _HAND_GROUP if part.kind.value.endswith(("finger", "thumb")) else -1
+        group[joint] = _GROUPS.get(part.kind, finger)
+    return group
 
 
 def _is_long_bone(skeleton: Skeleton, parts: Sequence[BodyPart | None], joint: int) -> bool:

@@ -10,10 +10,16 @@ from devices.stream import SkeletonStream
 from replay.formats import read_recording
 from replay.player import EveryFrame, Player, RealTime
 from replay.recording import Recording
+from replay.stated import UNSTATED, Stated
 
 
 def open_stream(
-    source: str | Path, *, every_frame: bool = False, speed: float = 1.0, loop: bool = False
+    source: str | Path,
+    *,
+    every_frame: bool = False,
+    speed: float = 1.0,
+    loop: bool = False,
+    stated: Stated = UNSTATED,
 ) -> SkeletonStream:
     """Open a source of motion.
 
@@ -24,16 +30,18 @@ def open_stream(
             says; without it the recorded timing counts.
         speed: for a recording with its timing: how many times as fast as it was recorded.
         loop: for a recording: start again after the last frame.
+        stated: for a recording: what its file leaves open.
 
     Raises:
         InputError: there is no such device or file, it cannot be opened, or an option for
             recordings is given for a device.
     """
     if isinstance(source, Path) or "://" not in source:
-        return play(read_recording(Path(source)), every_frame=every_frame, speed=speed, loop=loop)
-    if every_frame or loop or speed != 1.0:
+        recording = read_recording(Path(source), stated)
+        return play(recording, every_frame=every_frame, speed=speed, loop=loop)
+    if every_frame or loop or speed != 1.0 or stated != UNSTATED:
         raise InputError(
-            f"cannot open {source} with every_frame, speed or loop: they are for recordings"
+            f"cannot open {source} with every_frame, speed, loop or stated: they are for recordings"
         )
     return devices.stream.open_stream(source)
 
