@@ -111,9 +111,11 @@ def recognise(path: Path) -> RecordingFormat:
 
 
 def _as_utf_8(head: bytes) -> bytes:
-    """The first bytes of a file in UTF-8 if they are UTF-16, else as they are."""
-    is_utf_16 = head[:2] in (b"\xff\xfe", b"\xfe\xff") or head[1:4:2] == b"\0\0"
-    return decoded(head[: len(head) & -2]).encode() if is_utf_16 else head
+    """The first bytes of a file in UTF-8, without a mark, if they are text, else as they are."""
+    marked = head[:2] in (b"\xff\xfe", b"\xfe\xff") or head[:3] == b"\xef\xbb\xbf"
+    if marked or b"\0\0" in (head[:4:2], head[1:4:2]):
+        return decoded(head[: len(head) & -2]).encode(errors="replace")
+    return head
 
 
 def read_recording(path: Path, stated: Stated = UNSTATED) -> Recording:

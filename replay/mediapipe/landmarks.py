@@ -42,6 +42,7 @@ class PersonLandmarks:
         world: pose [m] from the middle of the hips, by joint name; empty if there is none.
         image: pose in the image [pixels; z as far as its scale is known].
         hands: for each side the hand's landmarks in the units of `image`.
+        in_room: whether `world` moves through a room, and is not from the middle of the hips.
     """
 
     times: Array
@@ -49,6 +50,7 @@ class PersonLandmarks:
     world: Tracks
     image: Tracks
     hands: Mapping[str, Tracks]
+    in_room: bool = False
 
 
 def track(points: Array, confidence: Array) -> Array:

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from devices.bodies.joint_labels import hips_joint
 from devices.errors import InputError
 from devices.mediapipe.joints import (
     HAND_LANDMARKS,
@@ -27,6 +28,7 @@ from devices.skeleton import Skeleton
 from replay.mediapipe.landmarks import PersonLandmarks, Tracks, joints_in_metres, track
 from replay.mediapipe.pose_binary import PoseFile, has_pose_header, parse_pose
 from replay.mediapipe.text import has_landmark_text, parse_landmark_text
+from replay.orientation import floor_and_start, yaw_to_front
 from replay.recording import Recording
 from replay.stated import UNSTATED, Stated
 
@@ -35,6 +37,7 @@ Array = NDArray[np.float64]
 MAX_FILE = 512 << 20
 WORLD_WIDEST = 3.0  # [m] width of shoulders beyond which the unit is not metres
 USUAL_RATE = 25.0
+_STRAY = 0.02  # share of the frames of a room whose lowest joint may be below the floor
 _NOSE_TIP = ("1", "4")
 
 
@@ -60,7 +63,7 @@ def read_mediapipe(path: Path, stated: Stated = UNSTATED) -> Recording:
         if has_pose_header(data):
             people, notes = _people(parse_pose(data))
         else:
-            people, notes = parse_landmark_text(data)
+            people, notes = parse_landmark_text(data, stated)
         return _recording(people, notes)
     except InputError as error:
         raise InputError(f"{path} is not a readable recording of landmarks: {error}") from error
@@ -159,10 +162,15 @@ def _recording(people: Sequence[PersonLandmarks], notes: Sequence[str]) -> Recor
     order = np.argsort(times, kind="stable")
     stacked = np.concatenate(frames)[order]
     times = times[order] - times[order[0]]
+    positions = landmarks_to_world(stacked[..., :3])
+    if any(person.in_room for person in people):
+        yaw = yaw_to_front(skeleton, positions)
+        positions = positions if yaw is None else positions @ yaw.T
+        positions -= floor_and_start(positions, hips_joint(skeleton), stray=_STRAY)
     return Recording(
         skeleton=skeleton,
         times=times,
-        positions=landmarks_to_world(stacked[..., :3]),
+        positions=positions,
         rotations=None,
         confidence=stacked[..., 3],
         performers=np.concatenate([np.full(len(t.times), t.performer) for t in people])[order],

@@ -57,3 +57,50 @@ def test_07_a_frame_time_in_milliseconds(name: str, rate: int, cases: Path) -> N
     recording = read_recording(cases / "07-bvh-frame-time-ms" / f"{name}.bvh")
     np.testing.assert_allclose(recording.times, np.arange(24) / rate, rtol=1e-4)
     assert noted(recording, "--fps-input")
+
+
+def nose_over_ankles(recording: Recording) -> np.ndarray:
+    ankles = 0.5 * (height(recording, "left_ankle") + height(recording, "right_ankle"))
+    return height(recording, "nose") - ankles
+
+
+def across(recording: Recording, name: str) -> np.ndarray:
+    joints = [recording.skeleton.index(f"{side}_{name}") for side in ("left", "right")]
+    return recording.positions[:, joints[0], 0] - recording.positions[:, joints[1], 0]
+
+
+@pytest.mark.parametrize(
+    ("name", "frames", "seconds"),
+    [
+        ("09-mp-columns-from-one/coords.csv", 24, 23 / 30),
+        ("12-mp-timestamp-ms/epoch.json", 12, 0.367),
+        ("12-mp-timestamp-ms/tasks.json", 12, 0.367),
+        ("14-mp-portrait/image_size.json", 8, 0.231),
+        ("14-mp-portrait/wh.json", 8, 7 / 30),
+        ("17-mp-bare-lists/by_frame.json", 6, 5 / 30),
+        ("17-mp-bare-lists/lists.json", 6, 5 / 30),
+        ("18-mp-tfjs-blazepose/tfjs.json", 4, 3 / 30),
+        ("20-mp-indented-metadata/indent.json", 4, 3 / 30),
+    ],
+)
+def test_09_to_20_landmarks_stand_at_their_size(
+    name: str, frames: int, seconds: float, cases: Path
+) -> None:
+    recording = read_recording(cases / name)
+    assert len(recording) == frames
+    assert recording.seconds == pytest.approx(seconds, abs=2e-3)
+    np.testing.assert_allclose(nose_over_ankles(recording)[0], 1.5, atol=0.12)
+    assert across(recording, "shoulder")[0] > 0.3
+    assert across(recording, "hip")[0] > 0.1
+
+
+def test_09_columns_from_one_begin_with_the_nose(cases: Path) -> None:
+    recording = read_recording(cases / "09-mp-columns-from-one" / "coords.csv")
+    assert noted(recording, "counted from 1")
+    assert height(recording, "nose")[0] > height(recording, "left_shoulder")[0] > 0.3
+
+
+def test_18_keypoints_3d_are_in_metres(cases: Path) -> None:
+    recording = read_recording(cases / "18-mp-tfjs-blazepose" / "tfjs.json")
+    nose = recording.positions[2, recording.skeleton.index("nose")]
+    assert nose[2] == pytest.approx(0.10996, abs=1e-6)
