@@ -10,6 +10,8 @@ from devices.errors import InputError
 from replay.bvh.reader import read_bvh, recognises_bvh
 from replay.joint_table import read_joint_table, recognises_joint_table
 from replay.kinect.azure_csv import read_azure_csv, recognises_azure_csv
+from replay.kinect.azure_json import read_azure_json, recognises_azure_json
+from replay.kinect.joint_columns import read_joint_columns, recognises_joint_columns
 from replay.kinect.laban import read_laban, recognises_laban
 from replay.kinect.msr import read_msr, recognises_msr
 from replay.kinect.ntu import read_ntu, recognises_ntu
@@ -73,9 +75,19 @@ def formats() -> tuple[RecordingFormat, ...]:
         RecordingFormat("Bunraku recording (MCAP)", recognises_mcap, _certain(read_mcap)),
         RecordingFormat("Bunraku table (CSV)", recognises_joint_table, _certain(read_joint_table)),
         RecordingFormat("Leap Motion messages", recognises_leap, _certain(read_leap)),
+        RecordingFormat(
+            "Azure Kinect, offline processor (JSON)",
+            recognises_azure_json,
+            _certain(read_azure_json),
+        ),
         RecordingFormat("MediaPipe landmarks", recognises_mediapipe, read_mediapipe),
         RecordingFormat(
             "Azure Kinect joints (CSV)", recognises_azure_csv, _certain(read_azure_csv)
+        ),
+        RecordingFormat(
+            "Kinect table with joint names (CSV)",
+            recognises_joint_columns,
+            _certain(read_joint_columns),
         ),
         RecordingFormat(
             "Kinect v2, Labanotation Suite (CSV)", recognises_laban, _certain(read_laban)

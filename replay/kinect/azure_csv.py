@@ -31,7 +31,7 @@ def read_azure_csv(path: Path) -> Recording:
     Raises:
         InputError: a joint has no column, or a cell is not three numbers.
     """
-    notes: list[str] = ["no times in the file: 30 frames a second"]
+    notes: list[str] = ["no times in the file: 30 frames a second (--fps-input N)"]
     lines = [(at, line) for at, line in enumerate(read_lines(path), 1) if line.strip()]
     columns = _columns(lines[0][1].split(",") if lines else [])
     missing = [name for name in KINECT_AZURE.names if name not in columns]

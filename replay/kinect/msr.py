@@ -43,7 +43,7 @@ def read_msr(path: Path) -> Recording:
     Raises:
         InputError: see `number_rows`.
     """
-    notes: list[str] = ["no times in the file: 15 frames a second"]
+    notes: list[str] = ["no times in the file: 15 frames a second (--fps-input N)"]
     rows = number_rows(path, read_lines(path), 4, notes)
     joints = len(_ORDER)
     frames = len(rows) // joints

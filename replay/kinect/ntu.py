@@ -55,7 +55,7 @@ def read_ntu(path: Path) -> Recording:
     Raises:
         InputError: a line does not follow the layout, or there is no body.
     """
-    notes: list[str] = ["no times in the file: 30 frames a second"]
+    notes: list[str] = ["no times in the file: 30 frames a second (--fps-input N)"]
     bodies = _bodies(path, notes)
     if not bodies:
         raise InputError(f"{path}: holds no body")

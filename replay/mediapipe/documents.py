@@ -56,10 +56,10 @@ def has_landmark_json(head: str) -> bool:
     if (point := _POINT.search(head)) is not None:
         row = head[point.start() : head.find("]", point.end()) + 1 or len(head)]
         return len(_POINT.findall(row)) in _COUNTS
-    rows, row = _ROWS.search(head), _ROW.search(head)
+    rows, flat = _ROWS.search(head), _ROW.search(head)
     if rows is not None and rows[0].count("[") - 1 in _COUNTS:
         return True
-    numbers = 0 if row is None else row[0].count(",") + 1
+    numbers = 0 if flat is None else flat[0].count(",") + 1
     return numbers in {width * count for width in (3, 4) for count in _COUNTS}
 
 

@@ -104,3 +104,13 @@ def test_18_keypoints_3d_are_in_metres(cases: Path) -> None:
     recording = read_recording(cases / "18-mp-tfjs-blazepose" / "tfjs.json")
     nose = recording.positions[2, recording.skeleton.index("nose")]
     assert nose[2] == pytest.approx(0.10996, abs=1e-6)
+
+
+def test_24_azures_offline_processor(cases: Path) -> None:
+    recording = read_recording(cases / "24-kinect-azure-offline-json" / "azure.json")
+    assert recording.positions.shape == (6, 32, 3)
+    np.testing.assert_allclose(recording.times, np.arange(6) / 30, atol=2e-6)
+    assert height(recording, "Nose")[0] - height(recording, "FootRight")[0] == pytest.approx(
+        1.62, abs=0.05
+    )
+    assert set(recording.performers) == {0}
