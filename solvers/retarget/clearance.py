@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 # In heights of the performer.
 STANDS = 0.02  # a foot no higher above the place where it stands counts as standing: noise
-JUMPS = 0.06  # from here on the clearance is the whole height of a jump
+JUMPS = 0.04  # from here on the clearance is the whole height of a jump
 FLESH = 0.05  # around the joints of trunk, arms and legs, which lie, sit or kneel on it
 
 TUCK = 2.0  # times the rise of the trunk: what legs that are drawn up add to a jump

@@ -25,6 +25,7 @@ Records = NDArray[np.void]
 # Lengths in leg lengths of the character.
 PLAY = 0.03  # how far a standing foot of the performer drifts before the planted one goes along
 CREEP = 0.012  # [1/s] how fast a planted foot may move to where the leg alone would put it
+NEAR, PULL = 0.08, 4.0  # a foot farther from where the leg would put it goes there, at [1/s]
 FARTHEST = 0.25  # from its place before locking: a foot that is farther off lets go
 HOME = 0.02  # a foot that has let go is planted again when it is this near
 RETURN = 35.0  # [1/s] of the way back: a tenth of it is left after 0.11 s
@@ -61,8 +62,9 @@ class FootLock:
     """Plants feet, and lets them go.
 
     A planted foot may move as far as the performer's does once that has drifted by `PLAY`, and by
-    `CREEP`, never more. What it may move brings it to where the legs alone would put it. It lets go
-    when it is too far from there. From then on it goes back smoothly, also in velocity.
+    `CREEP`, and farther than `NEAR` from where the legs alone would put it with `PULL`, never more.
+    What it may move brings it there. It lets go when it is too far from there. From then on it goes
+    back smoothly, also in velocity.
 
     Args:
         legs: (F,) [m] length of the character's legs from hip to ankle.
@@ -165,9 +167,11 @@ def _plant(foot: Any, part: int, points: Array, performer: Array) -> None:
 @kernel
 def _stay(foot: Any, point: Array, performer: Array, leg: float, dt: float) -> None:
     """Keep the planted part in its place, but for what it may move."""
+    x, z = foot.plant[0] - point[0], foot.plant[1] - point[2]
+    far = max(math.hypot(x, z) - NEAR * leg, 0.0)
+    budget = CREEP * leg * dt + far * (1.0 - math.exp(-PULL * dt))
     x, z = performer[0] - foot.performer[0], performer[2] - foot.performer[1]
     drift = math.hypot(x, z)
-    budget = CREEP * leg * dt
     if drift > PLAY * leg:
         share = 1.0 - PLAY * leg / drift
         budget += share * drift

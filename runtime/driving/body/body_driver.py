@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,7 @@ from solvers.skeleton.quaternions import between, multiply, rotate
 
 Array = NDArray[np.float64]
 
+_LEVEL = 0.3  # least level share of the axis through both hips, of a body that stands
 _MEASURED = 64  # poses of a clip in which the upright body is measured
 
 
@@ -40,7 +41,7 @@ class BodyState:
 
     Attributes:
         rest: the performer's rest state; None while nothing drives.
-        origin: (2,) [m] where the performer's hips were when the character began to travel.
+        origin: (3,) [m] where the performer's hips were when the character began to travel.
         upright: (3, 4) the orientations of the performer's trunk while standing upright.
         trunk: (3, 4) the last turns of pelvis, chest and head.
         twists: (S,) [rad] of the forearms.
@@ -95,11 +96,19 @@ class BodyDriver:
         self._ratio = self._size_ratio(bodies.upright)
         # Who sits before a camera, or lends one arm only, does not move the whole.
         self._goes_along = len(parts.legs) == len(SIDES)
-        self._hips = bodies.tree.root
+        self._sinking = 1.0
+        self._hips = [bodies.tree.root]
+        self._their_hips: list[int] = []
+        if self._goes_along:
+            self._hips = [leg.target[0] for leg in parts.legs]
+            self._their_hips = [leg.source[0] for leg in parts.legs]
+            theirs = float(np.linalg.norm(np.diff(bodies.upright[self._their_hips], axis=0)))
+            ours = float(np.linalg.norm(np.diff(bodies.tree.positions[self._hips], axis=0)))
+            self._sinking = min(self._ratio * theirs / max(ours, 1e-9), 1.0)
         self._left = np.array([np.cos(bodies.facing), 0.0, -np.sin(bodies.facing)])
-        self._footing = Footing(bodies, parts)
-        owner = skeleton.skin.nodes[:, 0]
-        self._long_arms = LongArms(bodies.tree, pairing.surface.rest, owner, parts.arms, parts.legs)
+        vertices, owner = pairing.surface.rest, skeleton.skin.nodes[:, 0]
+        self._footing = Footing(bodies, parts, vertices, owner)
+        self._long_arms = LongArms(bodies.tree, vertices, owner, parts.arms, parts.legs)
         self._at_rest = Targets(skeleton.skinned(skeleton.rest_nodes), nodes=skeleton.rest_nodes)
         self._rest: Rest | None = None
         self._origin: Array | None = None
@@ -122,7 +131,7 @@ class BodyDriver:
     def prepare(self, clip: Sequence[Pose], rest: Rest | None) -> None:
         """Start to drive from this rest state: see `Driver.prepare`."""
         self._rest = rest
-        self._origin = clip[0].hips[[0, 2]] if clip else None
+        self._origin = self._middle_of(clip[0]) if clip else None
         self.reset()
         self._upright = self._upright_at_rest
         known = bool(clip) and self._joint_turns.learn(clip[0])
@@ -147,6 +156,7 @@ class BodyDriver:
         given = self._given(own[:-1], joints)
         if own[-1].any():
             self._trunk[2] = own[-1]
+        self._trunk[0] = self._levelled(self._trunk[0])
         self._footing.watch(pose)
         left = rotate(self._trunk[0], self._left)
         self._footing.turn_soles(joints, left, pose.time, given)
@@ -155,7 +165,10 @@ class BodyDriver:
         above = self._ratio * self._footing.above
         if self._long_arms.raise_arms(positions, rotations, given, across, above):
             pose_limbs(rig, joints, self._trunk, given, self._twists, rotations, positions)
-        path = self._path(pose, rest, heading)
+        path = self._path(pose, rest, heading, positions)
+        if self._goes_along:
+            shift = self._footing.hip_shift(pose, positions, path.performer_on_stage, path.on_stage)
+            path = replace(path, shift=shift)
         if self._footing.plant(
             pose,
             (positions, rotations),
@@ -168,8 +181,25 @@ class BodyDriver:
             pose_limbs(rig, joints, self._trunk, given, self._twists, rotations, positions)
         self._nodes = PosedNodes(positions, rotations)
         shape = self._skeleton.skinned(self._nodes)
-        placement = path.placement(self._ratio * self._footing.clearance(pose))
+        placement = path.placement(self._footing.clearance(pose))
         return Targets(shape, placement, self._nodes)
+
+    def _levelled(self, pelvis: Array) -> Array:
+        """The turn (4,) of a pelvis that sinks on one side as the performer's, in leg lengths.
+
+        Hips that are wider would lift one foot off the floor, and the body with the other.
+        """
+        left = rotate(pelvis, self._left)
+        sine = float(left[1])
+        lower = np.arcsin(np.clip(self._sinking * sine, -1.0, 1.0)) - np.arcsin(
+            np.clip(sine, -1.0, 1.0)
+        )
+        front = np.cross(left, (0.0, 1.0, 0.0))
+        long = float(np.linalg.norm(front))
+        if self._sinking == 1.0 or long < _LEVEL:
+            return pelvis
+        half = 0.5 * lower
+        return multiply(np.append(np.sin(half) / long * front, np.cos(half)), pelvis)
 
     def _given(self, hands: Array, joints: Array) -> Array:
         """The rotations (S, 4) of the hands, as the performer's rotations (S, 4) turn them.
@@ -187,18 +217,28 @@ class BodyDriver:
             given[hand] = turn
         return given
 
-    def _path(self, pose: Pose, rest: Rest, heading: float) -> Path:
+    def _middle_of(self, pose: Pose) -> Array:
+        """The place (3,) [m] between the performer's hips; of the hips of who goes nowhere."""
+        if not self._their_hips:
+            return pose.hips
+        middle: Array = pose.seen[self._their_hips].mean(axis=0)
+        return middle
+
+    def _path(self, pose: Pose, rest: Rest, heading: float, positions: Array) -> Path:
         """Where the whole is: the hips travel as the performer's, in lengths of the legs."""
+        middle = self._middle_of(pose)
         if self._origin is None:
-            self._origin = pose.hips[[0, 2]]
+            self._origin = middle
         return Path(
             turn=heading - rest.heading,
             about=self._skeleton.tree.positions[self._skeleton.root],
-            hips=self._parts.rig.rest[self._hips],
-            origin=np.array([self._origin[0], 0.0, self._origin[1]]),
+            hips=self._parts.rig.rest[self._hips].mean(axis=0),
+            posed=positions[self._hips].mean(axis=0),
+            origin=self._origin * (1.0, 0.0, 1.0),
             course=self._facing - rest.heading,
             ratio=self._ratio if self._goes_along else 0.0,
-            performer=pose.hips,
+            performer=middle,
+            shift=np.zeros(2),
         )
 
     def reset(self) -> None:
@@ -218,7 +258,7 @@ class BodyDriver:
 
     def snapshot(self) -> BodyState:
         """Return what is remembered: see `Driver.snapshot`."""
-        origin = np.full(2, np.nan) if self._origin is None else self._origin
+        origin = np.full(3, np.nan) if self._origin is None else self._origin
         return BodyState(
             self._rest,
             origin,

@@ -15,9 +15,11 @@ from runtime.driving.root_motion import chain_length
 from solvers.retarget.clearance import STANDS, clearance
 from solvers.retarget.foot_contacts import FootContacts, FootContactsState
 from solvers.retarget.foot_lock import FootLock, FootLockState
-from solvers.retarget.sole_pitch import SolePitch, SolePitchState
+from solvers.retarget.hip_shift import HipShift, HipShiftState
+from solvers.retarget.sole_pitch import ANGLES, SolePitch, SolePitchState, sole_depths
 from solvers.retarget.two_bone_ik import two_bone_turns
 from solvers.skeleton.quaternions import multiply, rotate
+from solvers.skeleton.tree import Tree
 
 Array = NDArray[np.float64]
 Place = Callable[[Array], Array]
@@ -32,11 +34,12 @@ class FootingState:
     """The states of the parts of a `Footing` between two frames.
 
     Attributes:
-        contacts, lock, soles: of the parts.
+        contacts, shift, lock, soles: of the parts.
         stood: (2,) [m] heights of hips and shoulders when a foot stood last; NaN before.
     """
 
     contacts: FootContactsState
+    shift: HipShiftState
     lock: FootLockState
     soles: SolePitchState
     stood: Array
@@ -48,9 +51,17 @@ class Footing:
     Args:
         bodies: the performer and the character.
         parts: their corresponding parts.
+        vertices: (C, 3) [m] of the character's surface at rest.
+        owner: (C,) the node that each vertex follows most.
     """
 
-    def __init__(self, bodies: TwoBodies, parts: BodyParts) -> None:
+    def __init__(
+        self,
+        bodies: TwoBodies,
+        parts: BodyParts,
+        vertices: Array,
+        owner: NDArray[np.int64],
+    ) -> None:
         rest, nodes = bodies.performer.rest_positions, bodies.tree.positions
         self._legs = legs = parts.legs
         own = {joint for leg in legs for joint in leg.source[2:]}
@@ -70,14 +81,24 @@ class Footing:
         theirs = [chain_length(rest, leg.source[:3]) for leg in legs]
         leg, their_leg = (float(np.mean(each or [1.0])) for each in (lengths, theirs))
         self._contacts = FootContacts(rest[self._parts, 1], their_leg)
+        self._shift = HipShift(np.array(lengths))
         self._lock = FootLock(np.array(lengths))
         ours = nodes[self._points[:, 1]] - nodes[self._points[:, 0]]
         front = rotate(about_vertical(bodies.facing), np.array([0.0, 0.0, 1.0]))
         ours[np.linalg.norm(ours, axis=1) < _SHORT * leg] = _FOOT * leg * front
         standing = bodies.upright[self._parts[:, 1]] - bodies.upright[self._parts[:, 0]]
-        alike = ours * their_leg / max(leg, 1e-9)
+        self._ratio = leg / max(their_leg, 1e-9)
+        self._depths = np.array(
+            [
+                sole_depths(_foot_surface(bodies.tree, part, vertices, owner), way)
+                for part, way in zip(self._points, ours, strict=True)
+            ]
+        ).reshape(-1, len(ANGLES))
         self._soles = SolePitch(
-            ours, np.where(self._has_toes[:, None], standing, alike), self._has_toes
+            ours,
+            np.where(self._has_toes[:, None], standing, ours),
+            self._has_toes,
+            self._depths,
         )
 
     def watch(self, pose: Pose) -> None:
@@ -101,9 +122,30 @@ class Footing:
         forward = np.cross(left, (0.0, 1.0, 0.0))
         ways[~self._has_toes] = forward
         heights, stands = self._contacts.heights[:, 0], self._contacts.stands[:, 0]
+        heights = self._ratio * heights
         turns = self._soles.turns(ways, left, heights, stands, time)
         real = feet >= 0
         given[feet[real]] = turns[real]
+
+    def hip_shift(
+        self, pose: Pose, positions: Array, performer_on_stage: Place, on_stage: Place
+    ) -> Array:
+        """Return how far (2,) [m] along x and z the hips move over the planted feet.
+
+        Args:
+            pose: of the performer.
+            positions: (K, 3) [m] of the character's nodes.
+            performer_on_stage: takes the performer's joints to the stage.
+            on_stage: takes the character's nodes to the stage, the hips not shifted.
+        """
+        if not len(self._legs):
+            return np.zeros(2)
+        return self._shift.follow(
+            on_stage(positions[self._points]),
+            performer_on_stage(pose.seen[self._parts]),
+            self._contacts.stands,
+            pose.time,
+        )
 
     def plant(
         self,
@@ -154,7 +196,10 @@ class Footing:
         return float(self._contacts.heights.min()) if len(self._legs) else 0.0
 
     def clearance(self, pose: Pose) -> float:
-        """How far the performer is above the floor [m]; 0 for one whose feet are not known."""
+        """How far the character is above the floor [m]; 0 for one whose feet are not known.
+
+        As far as the performer, and no farther than its own feet are.
+        """
         if not len(self._legs):
             return 0.0
         heights, floor = self._contacts.heights, float(self._contacts.floors.min())
@@ -162,11 +207,13 @@ class Footing:
         if heights.min() <= STANDS * self._stature or np.isnan(self._stood).any():
             self._stood = trunk
         rise = float((trunk - self._stood).min())
-        return clearance(heights, pose.seen[self._body], floor, self._stature, rise)
+        theirs = clearance(heights, pose.seen[self._body], floor, self._stature, rise)
+        return max(min(self._ratio * theirs, float(self._soles.above.min())), 0.0)
 
     def reset(self) -> None:
         """Forget the frames before."""
         self._contacts.reset()
+        self._shift.reset()
         self._lock.reset()
         self._soles.reset()
         self._stood = np.full(2, np.nan)
@@ -175,6 +222,7 @@ class Footing:
         """Return what the next frame depends on."""
         return FootingState(
             self._contacts.snapshot(),
+            self._shift.snapshot(),
             self._lock.snapshot(),
             self._soles.snapshot(),
             self._stood,
@@ -183,6 +231,17 @@ class Footing:
     def restore(self, state: FootingState) -> None:
         """Go back to a snapshot."""
         self._contacts.restore(state.contacts)
+        self._shift.restore(state.shift)
         self._lock.restore(state.lock)
         self._soles.restore(state.soles)
         self._stood = state.stood
+
+
+def _foot_surface(
+    tree: Tree, part: NDArray[np.int64], vertices: Array, owner: NDArray[np.int64]
+) -> Array:
+    """The points (n, 3) [m] of a foot's surface and of its nodes at rest, from the ankle."""
+    own = tree.subtree(int(part[0]))
+    points = np.concatenate([vertices[np.isin(owner, own)], tree.positions[list(own)]])
+    surface: Array = points - tree.positions[part[0]]
+    return surface

@@ -3,7 +3,7 @@
 A bird that let its wings hang as a performer lets the arms hang would stand on them as on stilts,
 and a robot with long arms could not squat. Arms give way to their own side, and forelegs, which
 stand on the floor at rest, to the front. An arm that just reaches the floor while the body stands
-upright is let be, as it points right.
+upright points right; only its hand gives way.
 """
 
 from __future__ import annotations
@@ -22,8 +22,8 @@ from solvers.skeleton.tree import Tree
 Array = NDArray[np.float64]
 
 _ASIDE = 0.3  # of an arm's length: an arm this far below the floor is laid out level
-_JUST = 0.25  # of the shoulder's height: what hangs no farther below the floor is no wing
-_TALL = (0.8, 0.9)  # of the shoulder's height at rest: from none to all of that is let be
+_JUST = 0.25  # of the shoulder's height: what hangs farther below the floor is a wing
+_WITH_HAND = 3  # segments
 _UP = np.array([0.0, 1.0, 0.0])
 _THICK = 90.0  # percentile of the distances from the surface of a hand to its bones
 
@@ -57,15 +57,19 @@ class LongArms:
         self._heights = [
             float(self._rest[arm.target[0], 1] - self._rest[:, 1].min()) for arm in self._arms
         ]
-        self._excess = [self._hanging(number) for number in range(len(self._arms))]
+        self._hands = [self._yielding(number) for number in range(len(self._arms))]
 
-    def _hanging(self, number: int) -> float:
-        """How far [m] an arm that hangs reaches below the floor; 0 for a wing or a foreleg."""
-        shoulder = self._rest[self._arms[number].target[0]]
-        reach = np.linalg.norm(self._rest[self._nodes[number]] - shoulder, axis=1).max()
-        excess = float(reach) + self._radii[number] - self._heights[number]
-        most = 0.0 if self._stands[number] else _JUST * self._heights[number]
-        return excess if 0.0 < excess < most else 0.0
+    def _yielding(self, number: int) -> list[int]:
+        """The nodes of a hand that gives way, as hanging it just reaches the floor; else none."""
+        arm, nodes = self._arms[number], self._nodes[number]
+        if len(arm.segments) < _WITH_HAND or self._stands[number]:
+            return []
+        away = np.linalg.norm(self._rest[nodes] - self._rest[arm.target[0]], axis=1)
+        height = self._heights[number]
+        if float(away.max()) + self._radii[number] > (1.0 + _JUST) * height:
+            return []
+        wrist = float(np.linalg.norm(self._rest[arm.starts[-1]] - self._rest[arm.target[0]]))
+        return [node for node, far in zip(nodes, away, strict=True) if far > wrist]
 
     def _radius(self, arm: Chain, vertices: Array, owner: NDArray[np.int64]) -> float:
         """How far [m] the surface of a hand is from its bones."""
@@ -102,19 +106,32 @@ class LongArms:
         raised = False
         for number, arm in enumerate(self._arms):
             shoulder = positions[arm.target[0]]
-            ways = positions[self._nodes[number]] - shoulder
-            low = int(np.argmin(ways[:, 1]))
             aside = forward if self._stands[number] else (shoulder - middle) @ left * left
-            height = float(shoulder[1]) - floor
-            tall = np.interp(height / self._heights[number], _TALL, (0.0, 1.0))
-            room = height - self._radii[number] + float(tall) * self._excess[number]
-            turn = _raised(ways[low], room, aside)
+            above_floor = floor + self._radii[number]
+            hand = self._hands[number]
+            nodes = [node for node in self._nodes[number] if node not in hand]
+            turn = _raised(*_lowest(positions, arm.target[0], nodes, above_floor), aside)
+            segments, starts = arm.segments, arm.starts
+            if hand:
+                wrist = starts[-1]
+                given_way = _raised(*_lowest(positions, wrist, hand, above_floor), aside)
+                if given_way is not None:
+                    given[segments[-1]] = multiply(given_way, rotations[wrist])
+                    segments, starts, raised = segments[:-1], starts[:-1], True
             if turn is None:
                 continue
             raised = True
-            for segment, node in zip(arm.segments, arm.starts, strict=True):
+            for segment, node in zip(segments, starts, strict=True):
                 given[segment] = multiply(turn, rotations[node])
         return raised
+
+
+def _lowest(
+    positions: Array, start: int, nodes: Sequence[int], floor: float
+) -> tuple[Array, float]:
+    """The way (3,) [m] from a node to the lowest of others, and how far it is above the floor."""
+    ways = positions[list(nodes)] - positions[start]
+    return ways[int(np.argmin(ways[:, 1]))], float(positions[start, 1]) - floor
 
 
 def _raised(way: Array, room: float, aside: Array) -> Array | None:

@@ -22,20 +22,24 @@ class Path:
     Attributes:
         turn: [rad] about the vertical, from rest.
         about: (3,) [m] the point at rest about which a placement turns.
-        hips: (3,) [m] the character's hips at rest.
-        origin: (3,) [m] where the performer's hips were when the path began.
+        hips: (3,) [m] the middle of the character's hips at rest.
+        posed: (3,) [m] the same in the posed body, before the placement.
+        origin: (3,) [m] where the middle of the performer's hips was when the path began.
         course: [rad] from the performer's way to the character's.
         ratio: the character's way for each metre of the performer's.
-        performer: (3,) [m] where the performer's hips are.
+        performer: (3,) [m] where the middle of the performer's hips is.
+        shift: (2,) [m] along x and z, by which the character's hips are off that way.
     """
 
     turn: float
     about: Array
     hips: Array
+    posed: Array
     origin: Array
     course: float
     ratio: float
     performer: Array
+    shift: Array
 
     def performer_on_stage(self, points: Array) -> Array:
         """Take points (..., 3) [m] of the performer to the stage, their heights only scaled."""
@@ -61,6 +65,9 @@ class Path:
 
     @property
     def _travel(self) -> Array:
-        way: Array = self.performer_on_stage(self.performer[None])[0] - self.hips
+        place = self.performer_on_stage(self.performer[None])[0]
+        way: Array = place - turned(self.posed[None], self.turn, self.hips)[0]
+        way[0] += self.shift[0]
         way[1] = 0.0
+        way[2] += self.shift[1]
         return way

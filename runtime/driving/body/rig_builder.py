@@ -91,6 +91,9 @@ class RigBuilder:
             if ours.lower:
                 self._twisted_by[last] = hand
                 self._take_beside(ours, hand)
+        elif ours.end and ours.lower:  # it goes along, but may give way to the floor
+            wrist = (theirs.lower or theirs.upper)[-1]
+            self._take_beside(ours, self._add(ours.end, wrist, wrist))
         return tuple(range(first, len(self._near)))
 
     def _add_hand(

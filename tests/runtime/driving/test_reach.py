@@ -37,7 +37,15 @@ class Walker:
 
 def walk(*ways: tuple[float, float], heading: float = 0.0) -> list[Pose]:
     still = seen(pose())
-    return [replace(still, hips=np.array([x, 1.0, z]), heading=heading) for x, z in ways]
+    return [
+        replace(
+            still,
+            seen=still.seen - still.hips + (x, 1.0, z),
+            hips=np.array([x, 1.0, z]),
+            heading=heading,
+        )
+        for x, z in ways
+    ]
 
 
 @pytest.mark.parametrize("finished", [False, True])

@@ -60,6 +60,7 @@ REMEMBERS = {
     "solvers.retarget.chain_retargets.ChainRetargets",
     "solvers.retarget.foot_contacts.FootContacts",
     "solvers.retarget.foot_lock.FootLock",
+    "solvers.retarget.hip_shift.HipShift",
     "solvers.retarget.sole_pitch.SolePitch",
     "solvers.retarget.match_hysteresis.MatchHysteresis",
     "solvers.signal.floor_plane.FloorFit",

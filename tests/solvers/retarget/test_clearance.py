@@ -20,7 +20,7 @@ def jump(height: float) -> float:
 
 @pytest.mark.parametrize("height", [-0.1, 0.0, 0.02, STANDS * TALL])
 def test_a_performer_who_stands_is_on_the_floor(height: float) -> None:
-    assert jump(height) == 0.0
+    assert jump(height) == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize("height", [JUMPS * TALL, 0.3, 0.7])
@@ -33,7 +33,7 @@ def test_a_jump_is_as_high_as_the_performers(height: float) -> None:
 @given(st.floats(-0.1, 0.4))
 def test_it_rises_with_the_performer_and_smoothly(height: float) -> None:
     less, more = jump(height), jump(height + 1e-4)
-    assert 0.0 <= less <= more <= less + 2.5e-4
+    assert 0.0 <= less <= more <= less + 3.5e-4
 
 
 def test_one_foot_on_the_floor_is_enough() -> None:

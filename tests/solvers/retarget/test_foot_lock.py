@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from solvers.retarget.foot_lock import CREEP, FARTHEST, PLAY, FootLock
+from solvers.retarget.foot_lock import CREEP, FARTHEST, NEAR, PLAY, PULL, FootLock
 from solvers.retarget.two_bone_ik import GIVE
 from tests.runtime.snapshots import digest, leaves
 
@@ -40,7 +40,7 @@ def test_a_foot_in_the_air_is_left_alone() -> None:
 
 @pytest.mark.parametrize("stands", [FLAT, TIPTOE])
 def test_a_planted_foot_stays_where_it_came_down(stands: np.ndarray) -> None:
-    zs = np.linspace(0.0, 0.15, 60)
+    zs = np.linspace(0.0, 0.07, 60)
     goals = perform(FootLock([LEG]), zs, [stands] * 60)
     assert 0.0 < goals[-1, 2] <= CREEP * LEG * 59 / RATE + 1e-12
     assert np.abs(np.diff(goals[:, 2])).max() <= CREEP * LEG / RATE + 1e-12
@@ -56,8 +56,17 @@ def test_a_planted_foot_creeps_home() -> None:
     assert goals[-1] == 0.03
 
 
+def test_a_leg_does_not_stay_far_from_where_it_points() -> None:
+    """As where wide hips turn over planted feet: the foot comes along before the leg is askew."""
+    zs = np.r_[np.linspace(0.0, 0.2, 60), np.full(60, 0.2)]
+    goals = perform(FootLock([LEG]), zs, [FLAT] * len(zs))[:, 2]
+    assert (zs - goals).max() < 0.14
+    assert zs[-1] - goals[-1] == pytest.approx(NEAR * LEG, abs=0.01)
+    assert np.abs(np.diff(goals)).max() < 0.14 * PULL / RATE
+
+
 def test_it_goes_back_smoothly() -> None:
-    zs = np.linspace(0.0, 0.4, 121)  # 0.2 m/s
+    zs = np.linspace(0.0, 0.14, 121)  # 0.07 m/s
     goals = perform(FootLock([LEG]), zs, [FLAT] * 60 + [NEITHER] * 61)[:, 2]
     speeds = np.diff(goals) * RATE
     assert np.abs(speeds[:59]).max() <= CREEP * LEG + 1e-9
@@ -95,7 +104,7 @@ def test_rolling_from_the_whole_foot_to_the_toes_moves_nothing() -> None:
 def test_it_goes_along_with_a_performer_who_slides_and_never_faster() -> None:
     rng = np.random.default_rng(0)
     performer = np.cumsum(np.r_[np.zeros(30), np.full(60, 0.004), rng.normal(0, 0.002, 60)])
-    goals = perform(FootLock([LEG]), performer * 1.2, [FLAT] * 150, performer)[:, 2]
+    goals = perform(FootLock([LEG]), performer * 1.1, [FLAT] * 150, performer)[:, 2]
     steps, theirs = np.abs(np.diff(goals)), np.abs(np.diff(performer))
     assert (steps <= theirs + CREEP * LEG / RATE + 1e-12).all()
     slid = performer[89] - goals[89]
@@ -103,11 +112,11 @@ def test_it_goes_along_with_a_performer_who_slides_and_never_faster() -> None:
 
 
 def test_a_foot_that_is_too_far_off_lets_go_and_is_planted_again() -> None:
-    zs = np.r_[np.zeros(5), np.linspace(0.0, 0.4, 60), np.full(60, 0.4)]
+    zs = np.r_[np.zeros(5), np.linspace(0.0, 0.6, 20), np.full(100, 0.6)]
     goals = perform(FootLock([LEG]), zs, [FLAT] * len(zs))[:, 2]
     assert np.abs(goals - zs).max() <= FARTHEST * LEG + 1e-9
     assert goals[-1] > FARTHEST * LEG
-    assert np.abs(np.diff(goals)).max() < 0.06  # and does not jump
+    assert np.abs(np.diff(goals)).max() < 0.08  # and does not jump
     assert np.abs(np.diff(goals)[-30:]).max() <= CREEP * LEG / RATE + 1e-12  # planted
 
 
@@ -116,8 +125,8 @@ def test_a_goal_is_always_within_reach() -> None:
     straight = np.array([[[0.0, 0.06, 0.0], [0.0, 0.02, 0.15]]])
     lock.goals(HIP, straight, straight, FLAT[None], 0.0)
     for i in range(1, 30):
-        points = straight + np.array([0.0, 0.0, 0.007 * i])
-        hips = HIP + np.array([0.0, 0.0, 0.007 * i])
+        points = straight + np.array([0.0, 0.0, 0.0024 * i])
+        hips = HIP + np.array([0.0, 0.0, 0.0024 * i])
         goal = lock.goals(hips, points, straight, FLAT[None], i / RATE)
         assert 0.0 <= goal[0, 2] <= CREEP * LEG * i / RATE + 1e-12
         assert np.linalg.norm(goal - hips) <= LEG + 1e-12

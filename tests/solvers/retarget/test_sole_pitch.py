@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from solvers.retarget.sole_pitch import SolePitch
+from solvers.retarget.sole_pitch import SolePitch, sole_depths
 from tests.runtime.snapshots import digest, leaves
 
 REST = np.array([[0.0, -0.08, 0.16]])  # of the character: down by 27 degrees
 THEIRS = np.array([[0.03, -0.05, 0.2]])  # of the performer: down by 14, a little outward
 LEFT = np.array([1.0, 0.0, 0.0])
+SOLE = np.array([[0.0, -0.08, 0.16], [0.0, -0.08, -0.05]])  # toes and heel
+DEPTHS = sole_depths(SOLE, REST[0])[None]
 HIGH, FLAT = np.array([1.0]), np.zeros(1)
 STANDS, STEPS = np.array([True]), np.array([False])
 
@@ -24,7 +26,7 @@ def pitched(foot: np.ndarray, degrees: float) -> np.ndarray:
 
 
 def sole(toes: bool = True) -> SolePitch:
-    return SolePitch(REST, THEIRS, np.array([toes]))
+    return SolePitch(REST, THEIRS, np.array([toes]), DEPTHS)
 
 
 def up(turns: np.ndarray) -> np.ndarray:
@@ -55,7 +57,7 @@ def test_it_tilts_by_as_much_as_the_performers(degrees: float, yaw: float) -> No
 
 def test_what_flat_is_is_learned_from_the_foot_that_stands() -> None:
     """A skeleton whose rest pose has the foot level, and a performer who stands on sloping ones."""
-    pitch = SolePitch(REST, np.array([[0.0, 0.0, 0.2]]), np.array([True]))
+    pitch = SolePitch(REST, np.array([[0.0, 0.0, 0.2]]), np.array([True]), DEPTHS)
     for i in range(120):
         turns = pitch.turns(THEIRS, LEFT, FLAT + 1.0, STANDS, i / 30.0)
     assert up(turns)[1] > 0.9999
@@ -74,16 +76,34 @@ def test_toes_do_not_reach_into_the_floor() -> None:
     pitch.turns(THEIRS, LEFT, FLAT, STANDS, 0.0)
     turns = pitch.turns(pitched(THEIRS, -40.0), LEFT, FLAT, STANDS, 0.0)
     np.testing.assert_allclose(up(turns), [0.0, 1.0, 0.0], atol=1e-12)
-    length = np.linalg.norm(THEIRS)
-    low = np.array([0.3 * length])  # the toes may sink by as much
+    low = np.array([0.05])  # the toes may sink by as much
     turns = pitch.turns(pitched(THEIRS, -60.0), LEFT, low, STEPS, 0.0)
-    stands = np.arcsin(-THEIRS[0, 1] / length)
-    room = np.arcsin(np.sin(stands) + 0.3) - stands
-    assert np.arccos(up(turns)[1]) == pytest.approx(room, abs=1e-6)
+    toes = Rotation.from_quat(turns).apply(SOLE)[:, 1].min()
+    assert toes == pytest.approx(-0.13, abs=1e-3)
+    assert pitch.above[0] == pytest.approx(0.0, abs=1e-5)
+
+
+def test_the_sole_of_a_foot_in_the_air_is_as_high_as_it_looks() -> None:
+    pitch = sole()
+    pitch.turns(THEIRS, LEFT, FLAT, STANDS, 0.0)
+    turns = pitch.turns(pitched(THEIRS, -30.0), LEFT, HIGH, STEPS, 0.0)
+    lowest = 0.08 + HIGH[0] + Rotation.from_quat(turns).apply(SOLE)[:, 1].min()
+    assert pitch.above[0] == pytest.approx(lowest, abs=1e-3)
+
+
+def test_a_long_foot_tilts_less() -> None:
+    twice = sole_depths(SOLE * (1.0, 1.0, 2.0), REST[0])[None]
+    angles = []
+    for depths in (DEPTHS, twice):
+        pitch = SolePitch(REST, THEIRS, np.array([True]), depths)
+        pitch.turns(THEIRS, LEFT, FLAT, STANDS, 0.0)
+        turns = pitch.turns(pitched(THEIRS, -50.0), LEFT, np.array([0.05]), STEPS, 0.0)
+        angles.append(np.degrees(np.arccos(up(turns)[1])))
+    assert 5.0 < angles[1] < 0.6 * angles[0]
 
 
 def test_a_foot_without_toes_is_level_while_it_stands_and_else_follows_the_shin() -> None:
-    pitch = SolePitch(REST, REST, np.array([False]))
+    pitch = SolePitch(REST, REST, np.array([False]), DEPTHS)
     tilted = pitched(REST, 25.0)
     turns = pitch.turns(tilted, LEFT, FLAT, STANDS, 0.0)
     np.testing.assert_allclose(up(turns), [0.0, 1.0, 0.0], atol=1e-12)

@@ -1,4 +1,4 @@
-"""Wings that would reach below the floor lie on it, and all other arms are let be."""
+"""Wings that would reach below the floor lie on it; of arms that just do only the hands."""
 
 from __future__ import annotations
 
@@ -110,14 +110,20 @@ def test_a_foreleg_that_reaches_below_the_floor_slides_forward() -> None:
     assert way[0] == pytest.approx(0.0, abs=1e-9)
 
 
-def test_an_arm_that_just_reaches_the_floor_points_right_while_the_body_is_tall() -> None:
+def test_an_arm_that_just_reaches_the_floor_points_right_and_its_hand_gives_way() -> None:
     straight = Rotation.from_euler("z", -np.pi / 2.0)
-    nodes = NODES.copy()
-    nodes[4:, 0] = [0.6, 1.05]  # 0.85 from the shoulder, which is 0.8 high
-    arm = LongArms(Tree(PARENTS, nodes), nodes[4:5], np.array([4]), [WING], [LEG])
-    positions, rotations = hung(straight)
+    nodes = np.append(NODES, [[0.0, 0.8, 0.0]], axis=0)
+    nodes[4:, 0] = [0.6, 0.92, 1.07]  # 0.87 from the shoulder, which is 0.8 high
+    reaching = Arm((3, 4, 5, 6), (0, 1, 2), (3, 4, 5))
+    arm = LongArms(Tree(np.append(PARENTS, 5), nodes), nodes[5:6], np.array([5]), [reaching], [LEG])
+    positions, rotations = nodes.copy(), np.tile(straight.as_quat(), (7, 1))
     positions[3:] = nodes[3] + straight.apply(nodes[3:] - nodes[3])
-    left = np.array([1.0, 0.0, 0.0])
-    assert not arm.raise_arms(positions, rotations, np.zeros((4, 4)), left, 0.0)
+    turns = np.zeros((4, 4))
+    assert arm.raise_arms(positions, rotations, turns, LEFT, 0.0)
+    assert not turns[:2].any(), "neither upper arm nor forearm"
+    tip = positions[5] + Rotation.from_quat(turns[2]).apply(nodes[6] - nodes[5])
+    assert tip[1] == pytest.approx(0.0, abs=1e-9)
+    assert tip[0] > positions[5, 0], "outward"
     positions[3:, 1] -= 0.2  # a squat
-    assert arm.raise_arms(positions, rotations, np.zeros((4, 4)), left, 0.0)
+    assert arm.raise_arms(positions, rotations, turns, LEFT, 0.0)
+    assert turns[:2].any(axis=1).all()
