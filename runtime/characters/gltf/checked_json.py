@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,6 +14,12 @@ from runtime.characters.formats.mesh_data import MeshError
 
 MOST_ENTRIES = 1_000_000
 """No list of a glTF document is longer."""
+
+
+# What C libraries print for numbers that are none.
+_NO_NUMBER = re.compile(
+    r"(?<=[\[,:\s])[-+]?(?:nan(?:\([a-z]*\))?|inf(?:inity)?|1\.#[a-z]+)(?=[\s,\]}])", re.IGNORECASE
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +83,13 @@ class Entry:
             raise self.wrong(f"{name} holds what is no index below {below}")
         return values
 
+    def row(self, name: str) -> list[float]:
+        """A list of finite numbers; empty where it is missing."""
+        values = self._list(name)
+        if not all(_is_moderate(value) for value in values):
+            raise self.wrong(f"{name} holds what is no number of a sensible size")
+        return [float(value) for value in values]
+
     def child(self, name: str) -> Entry | None:
         """A property that is an object, or None where it is missing."""
         value = self.fields.get(name)
@@ -111,13 +125,17 @@ def _is_moderate(value: object) -> bool:
 
 
 def parse_document(content: bytes) -> Entry:
-    """Parse a document in UTF-8 JSON.
+    """Parse a document in UTF-8 JSON, padded perhaps with zero bytes.
+
+    NaN and infinity, which some exporters write as the bounds of accessors, are let through: no
+    getter returns them.
 
     Raises:
         MeshError: it is not JSON, not an object, or not glTF 2.
     """
     try:
-        value = json.loads(content.decode("utf-8-sig"), parse_constant=_no_constant)
+        text = content.rstrip(b"\0 \r\n\t").decode("utf-8-sig")
+        value = _parsed(text)
     except (ValueError, RecursionError):
         raise MeshError("its JSON is cut short or damaged; export the model again") from None
     if not isinstance(value, dict):
@@ -130,5 +148,11 @@ def parse_document(content: bytes) -> Entry:
     return document
 
 
-def _no_constant(name: str) -> float:
-    raise ValueError(f"{name} is no JSON number")
+def _parsed(text: str) -> Any:
+    try:
+        return json.loads(text)
+    except ValueError:
+        mended = _NO_NUMBER.sub("NaN", text)
+        if mended == text:
+            raise
+        return json.loads(mended)

@@ -10,7 +10,7 @@ import base64
 import binascii
 import struct
 from pathlib import Path
-from urllib.parse import unquote
+from urllib.parse import unquote, unquote_to_bytes
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,13 +25,20 @@ COMPRESSIONS = (
     "EXT_meshopt_compression",
     "KHR_meshopt_compression",
 )
+_STANDARD = str.maketrans("-_", "+/")  # of the alphabet for addresses
 _MOST_ELEMENTS = 3 * MOST_FACES
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 
 
 class GltfFile:
-    """An open glTF, GLB or VRM file; buffers are read at their first use."""
+    """An open glTF, GLB or VRM file; buffers are read at their first use.
+
+    Attributes:
+        folder: where it lies.
+        document: its JSON.
+        notes: repairs of the file, one short line each, each once.
+    """
 
     def __init__(self, path: Path) -> None:
         """Read `path`.
@@ -47,6 +54,7 @@ class GltfFile:
         for name in self.document.texts("extensionsRequired"):
             if name in COMPRESSIONS:
                 raise compressed(name)
+        self.notes: dict[str, None] = {}
         self._lists: dict[str, list[Entry]] = {}
         self._buffers: dict[int, bytes] = {}
 
@@ -73,22 +81,11 @@ class GltfFile:
         Raises:
             MeshError: the URI leaves the folder, is damaged, or the file cannot be read.
         """
-        if uri.startswith("data:"):
-            head, _, body = uri.partition(",")
-            try:
-                if head.endswith(";base64"):
-                    return base64.b64decode(body, validate=True)
-                return unquote(body).encode("latin-1")
-            except (binascii.Error, ValueError):
-                raise MeshError("a data URI is damaged; export the model again") from None
-        name = unquote(uri)
+        if uri[:5].lower() == "data:":
+            return _data(uri)
+        name = unquote(uri).replace("\\", "/")
         inside = Path(name)
-        if (
-            not name.isprintable()
-            or any(sign in name for sign in ":\\")
-            or inside.is_absolute()
-            or ".." in inside.parts
-        ):
+        if not name.isprintable() or ":" in name or inside.is_absolute() or ".." in inside.parts:
             raise MeshError(
                 f"it names {name[:60]!r}, which is not beside it; put the file into its folder"
             )
@@ -140,13 +137,20 @@ class GltfFile:
             result = np.maximum(result / np.iinfo(values.dtype.str).max, -1.0)
         return result
 
-    def wholes(self, index: int, kind: str) -> NDArray[np.int64]:
-        """An accessor's elements (n, width), which must be unsigned integers."""
+    def wholes(self, index: int, *kinds: str) -> NDArray[np.int64]:
+        """An accessor's elements (n, width), which must be whole numbers from 0.
+
+        Some exporters write them as floats or signed; that is noted.
+        """
         accessor = self.entry("accessors", index)
-        values = self._elements(accessor, (kind,))
-        if values.dtype.kind != "u":
+        values = self._elements(accessor, kinds)
+        if values.dtype.kind == "u":
+            return values.astype(np.int64)
+        numbers = values.astype(np.float64)
+        if not ((numbers >= 0.0) & (numbers < 1 << 32) & (numbers == np.floor(numbers))).all():
             raise accessor.wrong("it holds indices that are no unsigned integers")
-        return values.astype(np.int64)
+        self.notes["indices that are no unsigned integers were taken as such"] = None
+        return numbers.astype(np.int64)
 
     def count(self, index: int) -> int:
         """The number of elements of an accessor, without reading them."""
@@ -196,6 +200,22 @@ class GltfFile:
         return np.ndarray(
             (count, width), component, view if count else None, start, (stride, size)
         ).copy()
+
+
+def _data(uri: str) -> bytes:
+    """The bytes of a data URI; base64 may be wrapped, percent-encoded or without its padding.
+
+    Raises:
+        MeshError: it is damaged.
+    """
+    head, _, body = uri.partition(",")
+    if not head.replace(" ", "").lower().endswith(";base64"):
+        return unquote_to_bytes(body)
+    coded = "".join(unquote(body).split()).rstrip("=").translate(_STANDARD)
+    try:
+        return base64.b64decode(coded + "=" * (-len(coded) % 4), validate=True)
+    except (binascii.Error, ValueError):
+        raise MeshError("a data URI is damaged; export the model again") from None
 
 
 def compressed(name: str) -> MeshError:

@@ -15,10 +15,11 @@ from runtime.characters.formats.mesh_data import MOST_FACES, MOST_VERTICES, Mesh
 from runtime.characters.gltf.checked_json import Entry
 from runtime.characters.gltf.file import COMPRESSIONS, GltfFile, compressed
 from runtime.characters.gltf.material import MaterialReader, texture_coordinates
-from runtime.characters.gltf.morphs import MorphReader, PartMorph
+from runtime.characters.gltf.morphs import MorphReader, PartMorph, shaped
 from runtime.characters.gltf.scene import MOST_NODES, Scene
 
 Array = NDArray[np.float64]
+_SEVERAL = ("VEC4", "VEC3", "VEC2", "SCALAR")  # joints of a vertex; glTF allows only four
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6
 
 
@@ -89,7 +90,9 @@ def _read_part(
     mode = primitive.whole("mode", _TRIANGLES, below=7)
     if mode < _TRIANGLES or "POSITION" not in attributes:
         return None
+    mesh = file.entry("meshes", file.entry("nodes", node).whole("mesh"))
     positions = _positions(file, primitive, attributes)
+    positions = shaped(file, (file.entry("nodes", node), mesh), primitive, positions)
     faces = _faces(file, primitive, mode, len(positions))
     if not len(faces):
         return None
@@ -103,6 +106,8 @@ def _read_part(
     else:
         skin, on_joints = weights
         vertices, to_scene, by_node = _skinned(file, scene, skin, on_joints, positions)
+        mirrored = np.linalg.det(to_scene)[faces].sum(axis=1) < 0.0
+        faces = np.where(mirrored[:, None], faces[:, ::-1], faces)
     material = primitive.optional("material")
     return MeshPart(
         node,
@@ -207,14 +212,16 @@ def _weights(
         joints, weights = f"JOINTS_{number}", f"WEIGHTS_{number}"
         if joints not in attributes or weights not in attributes:
             break
-        who = file.wholes(_matching(file, attributes, joints, count), "VEC4")
-        how_much = file.floats(_matching(file, attributes, weights, count), "VEC4")
+        who = file.wholes(_matching(file, attributes, joints, count), *_SEVERAL)
+        how_much = file.floats(_matching(file, attributes, weights, count), *_SEVERAL)
+        if who.shape != how_much.shape:
+            raise attributes.wrong(f"{joints} and {weights} name different numbers of joints")
         if not (np.abs(how_much) < 1e6).all():
             raise attributes.wrong("a skin weight is not a finite number")
         how_much = np.maximum(how_much, 0.0)
         if (who[how_much > 0.0] >= known).any():
             raise attributes.wrong(f"a vertex follows a joint beyond the {known} of its skin")
-        rows = np.repeat(np.arange(count), 4)
+        rows = np.repeat(np.arange(count), who.shape[1])
         columns = np.minimum(who, known - 1).ravel()
         total = total + coo_array((how_much.ravel(), (rows, columns)), shape=(count, known)).tocsr()
     return skin, _normalized(csr_array(total))

@@ -124,6 +124,33 @@ class MorphReader:
         return moved, deltas[moved]
 
 
+def shaped(
+    file: GltfFile, owners: tuple[Entry, Entry], primitive: Entry, positions: Array
+) -> Array:
+    """Positions (m, 3) moved by the default weights of their morph targets.
+
+    Args:
+        file: of the primitive.
+        owners: the node, whose weights come first, and its mesh.
+        primitive: with the targets.
+        positions: as the primitive has them.
+    """
+    try:
+        weights = next((row for owner in owners if (row := owner.row("weights"))), [])
+        targets = primitive.children("targets")[: len(weights)]
+        for weight, target in zip(weights[:MOST_TARGETS], targets[:MOST_TARGETS], strict=False):
+            if weight == 0.0 or "POSITION" not in target:
+                continue
+            deltas = file.floats(target.whole("POSITION"), "VEC3")
+            if deltas.shape != positions.shape or not (np.abs(deltas) < 1e15).all():
+                raise target.wrong("its deltas do not fit the vertices")
+            positions = positions + weight * deltas
+            file.notes["default weights of morph targets shape the surface at rest"] = None
+    except MeshError as error:
+        file.notes[f"default weights of morph targets are left out: {error}"] = None
+    return positions
+
+
 def _target_names(mesh: Entry, primitive: Entry) -> list[str]:
     """The names of a mesh's targets: in its extras, or in those of its primitive (VRM 0)."""
     for entry in (mesh, primitive):

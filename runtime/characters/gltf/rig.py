@@ -86,6 +86,7 @@ def _read(path: Path) -> GltfModel:
     look, morphs = MaterialReader(file), MorphReader(file)
     parts, notes = read_parts(file, scene, look, morphs)
     joints = _skin_joints(file, parts)
+    notes += file.notes
     if not parts:
         return _dressed(file, scene, joints)
     model = _surface(parts, look, faces_backward="VRM" in _extensions(file), notes=notes)

@@ -53,7 +53,7 @@ def read_scene(file: GltfFile) -> Scene:
     Raises:
         MeshError: it is no forest, or a transform is not finite.
     """
-    nodes = file.entries("nodes")
+    nodes = _with_lone_meshes(file)
     if len(nodes) > MOST_NODES:
         raise MeshError(f"it has {len(nodes)} nodes, more than {MOST_NODES}; simplify the scene")
     children = [node.wholes("children", below=len(nodes)) for node in nodes]
@@ -79,7 +79,21 @@ def read_scene(file: GltfFile) -> Scene:
             to_scene[node] = local if parents[node] < 0 else to_scene[parents[node]] @ local
     if not (np.abs(to_scene) < 1e15).all():
         raise MeshError("the transform of a node is beyond all bounds; export the model again")
-    return Scene(parents, to_scene, tuple(_depth_first(_scene_roots(file, roots), children)))
+    drawn = _depth_first(_scene_roots(file, roots), children)
+    if not any("mesh" in nodes[node] for node in drawn) and any("mesh" in node for node in nodes):
+        file.notes["the default scene draws no mesh: all of the file's are used"] = None
+        drawn = _depth_first(roots, children)
+    return Scene(parents, to_scene, tuple(drawn))
+
+
+def _with_lone_meshes(file: GltfFile) -> list[Entry]:
+    """The nodes; where none of them has a mesh, followed by one for each mesh of the file."""
+    nodes = file.entries("nodes")
+    meshes = len(file.entries("meshes"))
+    if meshes and not any("mesh" in node for node in nodes):
+        file.notes["no node draws a mesh: all of the file's are used as they are"] = None
+        nodes += [Entry({"mesh": mesh}, f"the node of mesh {mesh}") for mesh in range(meshes)]
+    return nodes
 
 
 def _scene_roots(file: GltfFile, roots: list[int]) -> list[int]:

@@ -9,6 +9,7 @@ import pytest
 
 from runtime.characters.formats.mesh_data import FileMesh
 from runtime.characters.formats.mesh_file import read_mesh_file
+from runtime.characters.gltf.rig import GltfModel, read_gltf
 
 
 @pytest.fixture
@@ -67,6 +68,33 @@ def test_full_transparency_of_every_material_is_taken_as_opaque(cases: Path) -> 
 def test_texture_coordinates_of_corners_split_no_vertex(cases: Path) -> None:
     mesh = read_mesh_file(cases / "47-ply-wedge-texcoord" / "wedge.ply")
     assert (len(mesh.vertices), len(mesh.faces)) == (108, 212)
+
+
+def solid(model: GltfModel) -> float:
+    a, b, c = model.file_vertices[model.faces].transpose(1, 0, 2)
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
+
+
+@pytest.mark.parametrize("name", ["mesh_weights", "node_weights"])
+def test_default_morph_weights_shape_the_rest_surface(name: str, cases: Path) -> None:
+    model = read_gltf(cases / "27-gltf-morph-default-weights" / f"{name}.glb")
+    np.testing.assert_allclose(np.ptp(model.file_vertices, axis=0), [0.9, 2.0, 0.9], atol=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("name", "note"),
+    [
+        ("28-gltf-joints-float/float.glb", "no unsigned integers"),
+        ("30-glb-json-padded-with-zeros/nul.glb", ""),
+        ("31-gltf-mirrored-skin/mirror.glb", ""),
+        ("36-gltf-mesh-outside-scene/outside.gltf", "default scene draws no mesh"),
+    ],
+)
+def test_gltf_of_other_exporters_is_the_same_prism(name: str, note: str, cases: Path) -> None:
+    model = read_gltf(cases / name)
+    assert (len(model.file_vertices), len(model.faces)) == (108, 212)
+    assert solid(model) == pytest.approx(0.54)
+    assert note in "; ".join(model.notes)
 
 
 @pytest.mark.parametrize("case", ["01-*", "03-*", "04-*", "08-*"])
