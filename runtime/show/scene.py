@@ -83,6 +83,7 @@ class Scene:
         self._inset = None if plain else SkeletonInset(*body_bones(performer))
         self.highlights = not plain
         self.camera = front_camera()
+        self._close_up: Camera | None = None
         self._rest = self.stage.boxes
         self._reaches: Sequence[Reach] | None = None
         self._glide = Glide(len(puppets))
@@ -177,8 +178,17 @@ class Scene:
         """Return the newest picture (H, W, 4): sRGB with straight alpha, top row first."""
         return self.stage.read()
 
+    def look_at(self, box: NDArray[np.float64]) -> None:
+        """Show what is in a box (2, 3) [m] from the front, in the pictures from now on.
+
+        The camera glides no more; spot lights and curtain still do.
+        """
+        self._close_up = front_camera().frame(box, self.stage.aspect)
+
     def _gliding_camera(self) -> Camera:
         """The camera where it has glided to: as far on, and back, as framing all takes it."""
+        if self._close_up is not None:
+            return self._close_up
         if not self._follows or not self._glide.places.any():
             return self.camera
         now = self._boxes.copy()

@@ -54,7 +54,7 @@ class ContactSheet:
             return
         vertices = show.motions[0].vertices
         box = np.array([vertices.min(axis=0), vertices.max(axis=0)])
-        scene.camera = scene.camera.frame(box, SIZE[0] / SIZE[1])
+        scene.look_at(box)
         self._pictures.append(on_black(show.picture))
 
     def write(self, path: Path, caption: Sequence[str]) -> None:
