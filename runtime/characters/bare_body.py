@@ -6,11 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 
+from devices.bodies.body_plan import BodyPlan
+from devices.bodies.rest_heading import rest_heading
 from devices.skeleton import Skeleton
+from runtime.characters.body_nodes.body_nodes import body_nodes
 from runtime.characters.character import Character
 from runtime.characters.plan_by_shape import plan_by_shape
 from solvers.skeleton.limbs import surface_points
-from solvers.skeleton.mirror_plane import SYMMETRIC, mirror_planes
+from solvers.skeleton.mirror_plane import SYMMETRIC, MirrorPlane, mirror_planes
 from solvers.skeleton.rejoined import rejoined
 
 _PLANES = 4  # that are tried
@@ -31,4 +34,21 @@ def with_body_by_shape(character: Character) -> Character:
         if parents is not None:
             skeleton = Skeleton(skeleton.names, parents, skeleton.rest_positions)
     plan = plan_by_shape(character.vertices, character.faces, skeleton.tree, planes)
-    return replace(character, skeleton=skeleton, plan=plan)
+    if plan is None:
+        return replace(character, skeleton=skeleton)
+    body = body_nodes(
+        character.vertices,
+        character.faces,
+        points,
+        skeleton.tree,
+        plan,
+        _plane_of(planes, skeleton, plan),
+    )
+    return replace(character, skeleton=skeleton, plan=plan, body=body)
+
+
+def _plane_of(planes: list[MirrorPlane], skeleton: Skeleton, plan: BodyPlan) -> MirrorPlane:
+    """The mirror plane between the left and the right of a body."""
+    facing = rest_heading(skeleton, plan)
+    left = np.array([np.cos(facing), 0.0, -np.sin(facing)])
+    return max(planes, key=lambda plane: abs(float(plane.normal @ left)))

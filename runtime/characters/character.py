@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,6 +49,19 @@ class Surface:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Body:
+    """Nodes by which a body is driven limb by limb.
+
+    Attributes:
+        skeleton: the nodes at rest, on the stage.
+        plan: the parts of the body, of these nodes.
+    """
+
+    skeleton: Skeleton
+    plan: BodyPlan
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Character:
     """A character in its rest pose on the stage: metres, +Y up, facing +Z, standing on y = 0.
 
@@ -66,6 +79,7 @@ class Character:
         plan: the parts of its body, of the skeleton's nodes; None where no body is recognised.
         notes: guesses and repairs, one short line each.
         morphs: what blend shapes can move; None where the file has no morph targets.
+        body: other nodes for driving it limb by limb than those of the skeleton; None for none.
     """
 
     name: str
@@ -79,6 +93,14 @@ class Character:
     plan: BodyPlan | None = None
     notes: tuple[str, ...] = ()
     morphs: Morphs | None = None
+    body: Body | None = None
+
+    @property
+    def limb_by_limb(self) -> Character:
+        """The character with the nodes by which it is driven limb by limb."""
+        if self.body is None:
+            return self
+        return replace(self, skeleton=self.body.skeleton, plan=self.body.plan, body=None)
 
     def in_file_coordinates(self, vertices: NDArray[np.float64]) -> NDArray[np.float64]:
         """Return file vertices (M, 3) in the file's frame for deformed welded vertices (N, 3)."""

@@ -18,17 +18,22 @@ BACK = np.radians(120.0)
 
 def turned(character: Character, rotation: NDArray[np.float64], note: str) -> Character:
     """Return the character turned about the vertical through the middle of the stage."""
-    skeleton = character.skeleton
     matrix = np.eye(4)
     matrix[:3, :3] = rotation
+    body = character.body
     return replace(
         character,
         vertices=character.vertices @ rotation.T,
-        skeleton=Skeleton(skeleton.names, skeleton.parents, skeleton.rest_positions @ rotation.T),
+        skeleton=_turned(character.skeleton, rotation),
         file_to_stage=matrix @ character.file_to_stage,
         notes=(*character.notes, note),
         morphs=None if character.morphs is None else character.morphs.turned(rotation),
+        body=None if body is None else replace(body, skeleton=_turned(body.skeleton, rotation)),
     )
+
+
+def _turned(skeleton: Skeleton, rotation: NDArray[np.float64]) -> Skeleton:
+    return Skeleton(skeleton.names, skeleton.parents, skeleton.rest_positions @ rotation.T)
 
 
 def facing_the_audience(character: Character) -> Character:

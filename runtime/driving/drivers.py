@@ -44,3 +44,6 @@ DRIVERS: Mapping[str, DriverFactory] = {
     "absolute": AbsoluteBodyDriver,
 }
 """Every driver by its name. A new driver is one more line here."""
+
+LIMB_BY_LIMB = (best_driver, AbsoluteBodyDriver)
+"""Drivers that move a body limb by limb, with the nodes that it has for that."""

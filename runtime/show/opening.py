@@ -20,7 +20,7 @@ from runtime.control.actions import ShowControls
 from runtime.control.keys import WindowControls
 from runtime.control.remote import PORT, Remote
 from runtime.control.window import Window, leave_windows
-from runtime.driving.drivers import DRIVERS, DriverFactory, matched_driver
+from runtime.driving.drivers import DRIVERS, LIMB_BY_LIMB, DriverFactory, matched_driver
 from runtime.driving.mapping import read_mapping
 from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer
@@ -88,6 +88,8 @@ class OpenedShow:
         self._stream = closing.enter_context(RecordedStream(stream))
         _check(characters, settings)
         self._make_driver = make_driver or _driver(settings.match)
+        if self._make_driver in LIMB_BY_LIMB and settings.match.mapping is None:
+            characters = [character.limb_by_limb for character in characters]
         self.remote = self._open_remote()
         usual = for_live() if self._recording is None else for_recording()
         self._conditioning = asked_for(usual, settings.conditioning)

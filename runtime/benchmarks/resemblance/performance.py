@@ -94,7 +94,7 @@ def perform(
                 motions.append(Motion(motion.vertices[:0], motion.nodes))
                 then(len(motions) - 1, show)
             show.settle()
-        report = show.report.summary()
+        report, driven = show.report.summary(), show.puppets[0].character
     ticks, stretch = report["stages_ms"]["frame"], report["stretch"]
     performer = plan_by_names(recording.skeleton)
     steps = np.array(watch.steps)
@@ -105,7 +105,7 @@ def perform(
         performer=None
         if performer is None
         else BodyTrack(recording.times, recording.positions, recording.rotations, performer),
-        character=_posed(recording.times, character, motions),
+        character=_posed(recording.times, driven, motions),
         positions=positions,
         lowest=np.array(watch.lowest),
         height=watch.height,
