@@ -11,11 +11,14 @@ from runtime.characters.formats.mesh_data import FileMesh, MeshError, check_coun
 from runtime.characters.formats.polygons import cut_polygons
 from runtime.characters.palette import linear_from_srgb
 
-_KEYWORD = re.compile(r"(ST)?(C)?(N)?(4)?(n)?OFF\b", re.ASCII)
+_KEYWORD = re.compile(r"(ST)?(C)?(N)?(4)?(n)?OFF(?=[\d-]|$)", re.ASCII)
 
 
 def read_off(content: bytes) -> FileMesh:
     """Read OFF, COFF, NOFF, CNOFF and STOFF; polygons are cut into triangles.
+
+    The keyword may be in small letters, and the counts may follow it without a break (ModelNet40).
+    Numbers may stand on any lines, unless vertices have colours.
 
     Colours of vertices are taken as sRGB, whole numbers to 255 or fractions to 1; colours of faces,
     normals and texture coordinates are left out.
@@ -33,11 +36,16 @@ def read_off(content: bytes) -> FileMesh:
     colored, normals, head = _header(lines)
     count, face_count = _counts(lines, head)
     check_counts(count, face_count)
-    if len(lines) < head + 1 + count + face_count:
+    body = lines[head + 1 :]
+    width = 3 + 3 * normals
+    short = len(body) < count + face_count or len(lines[head]) < 2
+    if short or any(len(row) < width for row in body[:count]):
+        words = [word for line in lines[head:] for word in line]
+        body = _rows(words[3:], count, face_count, width)
+    if len(body) < count + face_count:
         raise MeshError(
             f"it announces {count} vertices and {face_count} faces but ends before; it is cut short"
         )
-    body = lines[head + 1 :]
     vertices = _numbers(body[:count], 3)
     skipped = 3 + 3 * normals
     widths = {len(words) for words in body[:count]}
@@ -51,24 +59,40 @@ def read_off(content: bytes) -> FileMesh:
 
 def _header(lines: list[list[str]]) -> tuple[bool, bool, int]:
     """Whether vertices have colours, whether they have normals, and the line of the counts."""
-    found = _KEYWORD.fullmatch(lines[0][0])
+    word = lines[0][0]
+    found = _KEYWORD.match(word) or _KEYWORD.match(word.upper())
     if found is None:
-        raise MeshError(f"it does not begin with OFF but with {lines[0][0][:20]!r}")
+        raise MeshError(f"it does not begin with OFF but with {word[:20]!r}")
     if found[4] or found[5]:
         raise MeshError("it has vertices in four or more dimensions; export it in three")
     if len(lines[0]) > 1 and lines[0][1].upper() == "BINARY":
         raise MeshError("it is a binary OFF; export it as text")
-    rest = lines[0][1:]
+    glued = word[found.end() :]
+    rest = [glued, *lines[0][1:]] if glued else lines[0][1:]
     if rest:
         lines[0] = rest
     return bool(found[2]), bool(found[3]), 0 if rest else 1
 
 
 def _counts(lines: list[list[str]], head: int) -> tuple[int, int]:
+    words = [word for line in lines[head : head + 3] for word in line][:3]
     try:
-        return int(lines[head][0]), int(lines[head][1])
+        return int(words[0]), int(words[1])
     except (IndexError, ValueError):
         raise MeshError("the counts of vertices and faces after OFF are missing") from None
+
+
+def _rows(words: list[str], count: int, face_count: int, width: int) -> list[list[str]]:
+    """Vertices and faces as rows, where the file's lines do not part them."""
+    rows = [words[width * n : width * (n + 1)] for n in range(count)]
+    at = width * count
+    for _ in range(face_count):
+        if at >= len(words) or not words[at].isdecimal() or len(words[at]) > 7:
+            break
+        end = at + 1 + int(words[at])
+        rows.append(words[at:end])
+        at = end
+    return rows
 
 
 def _numbers(rows: list[list[str]], width: int) -> NDArray[np.float64]:

@@ -14,8 +14,13 @@ from runtime.characters.formats.mesh_data import FileMesh, MeshError, check_coun
 from runtime.characters.formats.polygons import cut_polygons
 from runtime.characters.palette import linear_from_srgb
 
-_ELEMENT = re.compile(rb"^element\s+(vertex|face)\s+(\d{1,18})\s*$", re.MULTILINE)
+_ELEMENT = re.compile(rb"^element\s+(vertex|face|tristrips)\s+(\d{1,18})\s*$", re.MULTILINE)
 _CORNERS = ("vertex_indices", "vertex_index")  # the names of a face's list of vertices
+_CHANNELS = (
+    "red green blue alpha",
+    "r g b a",
+    "diffuse_red diffuse_green diffuse_blue diffuse_alpha",
+)
 
 Indices = NDArray[np.int64]
 
@@ -33,7 +38,7 @@ def read_ply(content: bytes) -> FileMesh:
     count, face_count = _declared(content)
     check_counts(count, face_count)
     try:
-        vertices, corners, sizes, colors = _parsed(content, count)
+        vertices, corners, sizes, colors = _parsed(content)
     except MeshError:
         raise
     except Exception as error:  # the parser has no exceptions of its own: any of NumPy's and more
@@ -53,23 +58,28 @@ def _declared(content: bytes) -> tuple[int, int]:
     if not header.startswith(b"ply") or not end:
         raise MeshError("it does not begin with the header of a PLY file")
     counts = {kind: int(count) for kind, count in _ELEMENT.findall(header)}
-    return counts.get(b"vertex", 0), counts.get(b"face", 0)
+    faces = counts.get(b"face", 0) or min(counts.get(b"tristrips", 0), 1)
+    return counts.get(b"vertex", 0), faces
 
 
 def _parsed(
-    content: bytes, count: int
+    content: bytes,
 ) -> tuple[NDArray[np.float64], Indices, Indices, NDArray[np.float32] | None]:
     """Vertices (M, 3), the vertices of all corners (C,), corner counts (P,), colours (M, 4)."""
     from trimesh.exchange.ply import load_ply  # noqa: PLC0415  # slow to import
 
     parsed = load_ply(io.BytesIO(content), skip_materials=True, fix_texture=False)
     vertices = np.asarray(parsed.get("vertices", np.zeros((0, 3))), dtype=np.float64)
-    return vertices, *_polygons(parsed), _colors(parsed, count)
+    corners, sizes = _polygons(parsed)
+    inside = corners.size == 0 or bool(0 <= corners.min() <= corners.max() < len(vertices))
+    return vertices, corners, sizes, _colors(parsed, corners, sizes) if inside else None
 
 
 def _polygons(parsed: dict[str, Any]) -> tuple[Indices, Indices]:
     """The vertices of all corners (C,), and how many corners each face has (P,)."""
     elements = parsed["metadata"]["_ply_raw"]  # trimesh's own faces are cut as fans
+    if "face" not in elements and "tristrips" in elements:
+        return _strips(elements["tristrips"]["data"])
     data = elements.get("face", {}).get("data", {})
     names = tuple(data if isinstance(data, dict) else data.dtype.names or ())
     name = next((name for name in (*_CORNERS, *names[:1]) if name in names), None)
@@ -84,11 +94,56 @@ def _polygons(parsed: dict[str, Any]) -> tuple[Indices, Indices]:
     return np.concatenate(faces).astype(np.int64), sizes
 
 
-def _colors(parsed: dict[str, Any], count: int) -> NDArray[np.float32] | None:
-    """Linear colours (M, 4) of the vertices, if the file has one for each."""
-    from trimesh.visual.color import to_rgba  # noqa: PLC0415  # slow to import
+def _strips(data: Any) -> tuple[Indices, Indices]:
+    """Triangles of strips, parted by -1 (Stanford's scans), as corners and corner counts."""
+    names = tuple(data if isinstance(data, dict) else data.dtype.names or ())
+    if not names:
+        raise MeshError("its strips have no list of vertices; it is damaged")
+    lists = data[names[0]] if isinstance(data, dict) else data[names[0]]["f1"]
+    one = [np.append(np.asarray(strip, dtype=np.int64).reshape(-1), -1) for strip in lists]
+    run = np.concatenate([np.array([-1]), *one])
+    a, b, c = run[:-2], run[1:-1], run[2:]
+    breaks = np.flatnonzero(run < 0)
+    since = np.arange(len(a)) - breaks[np.searchsorted(breaks, np.arange(len(a)), side="right") - 1]
+    turned = since % 2 == 0  # every second triangle of a strip is turned over
+    triangles = np.column_stack([a, np.where(turned, c, b), np.where(turned, b, c)])
+    real = (triangles >= 0).all(axis=1) & (a != b) & (b != c) & (c != a)
+    return triangles[real].reshape(-1), np.full(int(real.sum()), 3, dtype=np.int64)
 
-    colors = parsed.get("vertex_colors")
-    if colors is None or len(colors) != count:
+
+def _colors(parsed: dict[str, Any], corners: Indices, sizes: Indices) -> NDArray[np.float32] | None:
+    """Linear colours (M, 4) of the vertices; where only faces have some, the mean of their faces'.
+
+    Whole numbers are sRGB to 255, fractions to 1. Names are red, r, diffuse_red and their kind.
+    """
+    elements = parsed["metadata"]["_ply_raw"]
+    count = len(parsed["vertices"])
+    own = _channels(elements.get("vertex", {}).get("data", {}))
+    if own is not None and len(own) == count:
+        return linear_from_srgb(own)
+    of_faces = _channels(elements.get("face", {}).get("data", {}))
+    if of_faces is None or len(of_faces) != len(sizes):
         return None
-    return linear_from_srgb(np.asarray(to_rgba(colors)) / 255.0)
+    colors = np.full((count, of_faces.shape[1]), np.nan)
+    touching = np.bincount(corners, minlength=count)
+    spread = np.repeat(of_faces, sizes, axis=0)
+    for channel in range(of_faces.shape[1]):
+        total = np.bincount(corners, weights=spread[:, channel], minlength=count)
+        colors[touching > 0, channel] = total[touching > 0] / touching[touching > 0]
+    return linear_from_srgb(colors)
+
+
+def _channels(data: Any) -> NDArray[np.float64] | None:
+    """Red, green, blue and perhaps alpha (n, 3 or 4) in [0, 1] of an element, or None."""
+    names = tuple(data if isinstance(data, dict) else data.dtype.names or ())
+    for spelled in _CHANNELS:
+        found = [name for channel in spelled.split() for name in names if name.lower() == channel]
+        if len(found) < 3:
+            continue
+        columns = [np.asarray(data[name]) for name in found]
+        values = np.column_stack([column.reshape(len(column)) for column in columns])
+        whole = columns[0].dtype.kind in "iu"
+        largest = np.iinfo(columns[0].dtype.str).max if whole and columns[0].itemsize <= 2 else 255
+        fractions = not whole and not (values > 1.0).any()
+        return values.astype(np.float64) / (1.0 if fractions else float(largest))
+    return None

@@ -70,6 +70,18 @@ def test_texture_coordinates_of_corners_split_no_vertex(cases: Path) -> None:
     assert (len(mesh.vertices), len(mesh.faces)) == (108, 212)
 
 
+@pytest.mark.parametrize("name", ["assimp", "diffuse", "faces"])
+def test_colours_by_other_names_and_of_faces_are_orange(name: str, cases: Path) -> None:
+    found = read_mesh_file(cases / "49-ply-colour-names" / f"{name}.ply").colors
+    assert found is not None
+    np.testing.assert_allclose(found, np.tile([1.0, 0.215, 0.051, 1.0], (108, 1)), atol=3e-3)
+
+
+def test_an_off_header_without_a_break(cases: Path) -> None:
+    mesh = read_mesh_file(cases / "50-off-glued-header" / "modelnet.off")
+    assert (len(mesh.vertices), len(mesh.faces)) == (108, 212)
+
+
 def solid(model: GltfModel) -> float:
     a, b, c = model.file_vertices[model.faces].transpose(1, 0, 2)
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
