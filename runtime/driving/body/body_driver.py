@@ -17,6 +17,7 @@ from runtime.driving.body.footing import Footing, FootingState
 from runtime.driving.body.joint_turns import JointTurns
 from runtime.driving.body.long_arms import LongArms
 from runtime.driving.body.path import Path
+from runtime.driving.body.rearing import Rearing
 from runtime.driving.body.upright import upright_at_rest, upright_in_poses
 from runtime.driving.driver import Highlight, Needs
 from runtime.driving.pairing import Pairing
@@ -108,6 +109,7 @@ class BodyDriver:
         self._left = np.array([np.cos(bodies.facing), 0.0, -np.sin(bodies.facing)])
         vertices, owner = pairing.surface.rest, skeleton.skin.nodes[:, 0]
         self._footing = Footing(bodies, parts, vertices, owner)
+        self._rearing = Rearing(bodies)
         self._long_arms = LongArms(bodies.tree, vertices, owner, parts.arms, parts.legs)
         self._at_rest = Targets(skeleton.skinned(skeleton.rest_nodes), nodes=skeleton.rest_nodes)
         self._rest: Rest | None = None
@@ -159,12 +161,13 @@ class BodyDriver:
         self._trunk[0] = self._levelled(self._trunk[0])
         self._footing.watch(pose)
         left = rotate(self._trunk[0], self._left)
+        trunk = self._rearing.reared(self._trunk, joints, left)
         self._footing.turn_soles(joints, left, pose.time, given)
-        pose_limbs(rig, joints, self._trunk, given, self._twists, rotations, positions)
-        across = rotate(self._trunk[1], self._left)
+        pose_limbs(rig, joints, trunk, given, self._twists, rotations, positions)
+        across = rotate(trunk[1], self._left)
         above = self._ratio * self._footing.above
         if self._long_arms.raise_arms(positions, rotations, given, across, above):
-            pose_limbs(rig, joints, self._trunk, given, self._twists, rotations, positions)
+            pose_limbs(rig, joints, trunk, given, self._twists, rotations, positions)
         path = self._path(pose, rest, heading, positions)
         if self._goes_along:
             shift = self._footing.hip_shift(pose, positions, path.performer_on_stage, path.on_stage)
@@ -178,7 +181,7 @@ class BodyDriver:
             on_stage=path.on_stage,
             off_stage=path.off_stage,
         ):
-            pose_limbs(rig, joints, self._trunk, given, self._twists, rotations, positions)
+            pose_limbs(rig, joints, trunk, given, self._twists, rotations, positions)
         self._nodes = PosedNodes(positions, rotations)
         shape = self._skeleton.skinned(self._nodes)
         placement = path.placement(self._footing.clearance(pose))

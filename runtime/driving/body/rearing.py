@@ -1,0 +1,90 @@
+"""Lets an animal on four legs rear when both arms of its performer go up.
+
+Its forelegs are the arms, so they rise with them; a trunk that stayed level would hang in the air.
+The chest rises fully, the pelvis and the head less, so that the spine arches and a tail stays above
+the floor.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from devices.bodies.body_plan import SIDES, BodyPlan, Limb
+from runtime.driving.body.body_parts import TwoBodies
+from runtime.driving.body.rig_builder import LOW
+from solvers.skeleton.quaternions import multiply
+
+Array = NDArray[np.float64]
+
+MOST = np.radians(55.0)
+"""The angle by which the chest rises when both arms point straight up."""
+
+_RISES = (-0.2, 0.8)  # sine of the lower arm's elevation: from level to fully reared
+_SHARES = (0.5, 1.0, 0.5)  # of pelvis, chest and head
+_LEVEL = 1.0  # of its length along the floor: a trunk that rises by more is upright
+
+
+class Rearing:
+    """How far the trunk of a character rears.
+
+    Args:
+        bodies: the performer and the character.
+    """
+
+    def __init__(self, bodies: TwoBodies) -> None:
+        pairs = list(bodies.pairs(bodies.source.arms, bodies.plan.arms))
+        rears = len(pairs) == len(SIDES) and _is_on_four(bodies.plan, bodies.tree.positions)
+        chains = [_to_wrist(theirs) for _, theirs, _ in pairs] if rears else []
+        self._arms = [np.array(chain, dtype=np.int64) for chain in chains]
+
+    def reared(self, trunk: Array, joints: Array, left: Array) -> Array:
+        """Return the turns (3, 4) of pelvis, chest and head with the rearing on top of them.
+
+        Args:
+            trunk: (3, 4) world rotations from standing upright.
+            joints: (J, 3) [m] the performer, turned as the character faces.
+            left: (3,) unit, the body's left.
+        """
+        angle = self.angle(joints)
+        if angle == 0.0:
+            return trunk
+        out = trunk.copy()
+        for part, share in enumerate(_SHARES):
+            half = -0.5 * share * angle
+            out[part] = multiply(np.append(np.sin(half) * left, np.cos(half)), trunk[part])
+        return out
+
+    def angle(self, joints: Array) -> float:
+        """Return the angle [rad] by which the chest rises above its place on four legs."""
+        if not self._arms:
+            return 0.0
+        low, high = _RISES
+        share = (min(_elevation(joints[arm]) for arm in self._arms) - low) / (high - low)
+        share = float(np.clip(share, 0.0, 1.0))
+        return float(MOST) * share * share * (3.0 - 2.0 * share)
+
+
+def _is_on_four(plan: BodyPlan, rest: Array) -> bool:
+    """Whether a body's trunk is level and its arms stand on the floor."""
+    if len(plan.legs) < len(SIDES):
+        return False
+    hips, shoulders = (
+        np.mean([rest[limb.upper[0]] for limb in limbs.values()], axis=0)
+        for limbs in (plan.legs, plan.arms)
+    )
+    rise, way = shoulders[1] - hips[1], np.hypot(*(shoulders - hips)[[0, 2]])
+    low = rest[:, 1].min() + LOW * np.ptp(rest[:, 1])
+    stands = all(rest[limb.segments[-1][-1], 1] < low for limb in plan.arms.values())
+    return bool(stands and abs(rise) < _LEVEL * way)
+
+
+def _to_wrist(arm: Limb) -> tuple[int, ...]:
+    bends = (arm.upper[0], arm.upper[-1])
+    return (*bends, arm.lower[-1]) if arm.lower else bends
+
+
+def _elevation(arm: Array) -> float:
+    """The height of the wrist above the shoulder, of the arm's length; -1 to 1."""
+    length = float(np.linalg.norm(np.diff(arm, axis=0), axis=1).sum())
+    return float(arm[-1, 1] - arm[0, 1]) / length if length > 0.0 else -1.0
