@@ -21,13 +21,14 @@ from replay.mcap.reader import read_mcap, recognises_mcap
 from replay.mediapipe.reader import read_mediapipe, recognises_mediapipe
 from replay.recording import Recording
 from replay.stated import UNSTATED, Stated
-from replay.text_file import decoded
+from replay.text_file import decoded, without_mark
 
 HEAD_BYTES = 4096
 JSON_HEAD_BYTES = 1 << 20
 """JSON may begin with anything: with the names of 478 points of a face, with a list of labels."""
 
 _OPENING = tuple("{[")
+_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,10 +125,9 @@ def recognise(path: Path) -> RecordingFormat:
 
 def _as_utf_8(head: bytes) -> bytes:
     """The first bytes of a file in UTF-8, without a mark, if they are text, else as they are."""
-    marked = head[:2] in (b"\xff\xfe", b"\xfe\xff") or head[:3] == b"\xef\xbb\xbf"
-    if marked or b"\0\0" in (head[:4:2], head[1:4:2]):
+    if b"\0\0" in (head[:4:2], head[1:4:2]):  # UTF-16 without a mark
         return decoded(head[: len(head) & -2]).encode(errors="replace")
-    return head
+    return without_mark(head[: len(head) & -2] if head[:2] in _UTF_16 else head)
 
 
 def read_recording(path: Path, stated: Stated = UNSTATED) -> Recording:

@@ -36,6 +36,12 @@ def decoded(raw: bytes) -> str:
     return _characters(raw).replace("\r\n", "\n").replace("\r", "\n")
 
 
+def without_mark(raw: bytes) -> bytes:
+    """Return bytes in UTF-8 without a byte order mark; those without any mark as they are."""
+    marked = any(raw.startswith(mark) for mark, _ in _MARKS)
+    return decoded(raw).encode(errors="replace") if marked else raw
+
+
 def _characters(raw: bytes) -> str:
     for mark, encoding in _MARKS:
         if raw.startswith(mark):

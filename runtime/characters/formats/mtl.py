@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import warnings
 from pathlib import Path
 
@@ -9,10 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image, UnidentifiedImageError
 
+from replay.text_file import without_mark
 from runtime.characters.character import Material
+from runtime.characters.formats.beside import beside
 from runtime.characters.palette import linear_from_srgb
 
 _FORMATS = ("PNG", "JPEG", "WEBP")  # Pillow's other decoders are less tested; EPS runs a program
+_WORDS = r"-(?:blend[uv]|boost|mm|[ost]|texres|clamp|bm|imfchan|type|cc|colorspace)"
+_VALUE = r"on|off|sphere|cube_\w+|[rgbmlz]|\w*RGB|auto|-?[\d.,]+(?:e[-+]?\d+)?"
+_VALUES = rf"(?:\s+(?:{_VALUE})(?=\s|$)){{0,3}}"
+_OPTIONS_BEFORE = re.compile(rf"^(?:\s*{_WORDS}{_VALUES}\s+)+", re.IGNORECASE)
+_OPTIONS_BEHIND = re.compile(rf"(?:\s+{_WORDS}{_VALUES})+\s*$", re.IGNORECASE)
 MOST_BYTES = 4 << 20
 MOST_TEXTURE_BYTES = 256 << 20
 MOST_TEXELS = 8192 * 8192
@@ -30,7 +38,7 @@ def read_mtl(path: Path) -> tuple[dict[str, Material], list[str]]:
         if not path.is_file():
             raise FileNotFoundError(path)
         with path.open("rb") as file:
-            text = file.read(MOST_BYTES).decode("utf-8-sig", errors="replace")
+            text = without_mark(file.read(MOST_BYTES)).decode("utf-8", errors="replace")
     except (OSError, ValueError):  # ValueError: a name that no file can have
         return {}, [f"material library {path.name!r} cannot be read: default colours"]
     settings = _settings(text)
@@ -75,7 +83,7 @@ def _color(said: dict[str, str], *, textured: bool) -> NDArray[np.float32]:
 
 def _numbers(text: str) -> list[float]:
     try:
-        values = [float(word) for word in text.split()]
+        values = [float(word.replace(",", ".")) for word in text.split()]
     except ValueError:
         return []
     return values if np.isfinite(values).all() else []
@@ -83,23 +91,28 @@ def _numbers(text: str) -> list[float]:
 
 def _texture(folder: Path, value: str) -> tuple[NDArray[np.uint8] | None, str]:
     """The picture (h, w, 4) that a `map_Kd` line names, and a note where there is none."""
-    name = value.rsplit(maxsplit=1)[-1] if value.startswith("-") else value  # behind options
-    path = folder / name.replace("\\", "/")
+    name = _without_options(value)
     fault = ""
     try:
-        if not path.resolve().is_relative_to(folder.resolve()):
-            fault = "is outside the character's folder: default colours"
-        elif not path.is_file():
-            fault = "is not there: default colours"
-        elif path.stat().st_size > MOST_TEXTURE_BYTES:
+        path = beside(folder, value) or beside(folder, name)
+        if path is not None and path.stat().st_size > MOST_TEXTURE_BYTES:
             fault = "is too large: left out"
-        else:
+        elif path is not None:
             return _picture(path), ""
+        else:
+            outside = not (folder / name).resolve().is_relative_to(folder.resolve())
+            fault = "is outside the character's folder" if outside else "is not there"
+            fault += ": default colours"
     except Image.DecompressionBombError:
         fault = "is too large: left out"
     except (OSError, ValueError, SyntaxError, UnidentifiedImageError):
         fault = "is no PNG, JPEG or WebP, or is damaged: default colours"
-    return None, f"texture {path.name!r} {fault}"
+    return None, f"texture {Path(name).name!r} {fault}"
+
+
+def _without_options(value: str) -> str:
+    """The name of a texture without the options before and, in some programs, behind it."""
+    return _OPTIONS_BEHIND.sub("", _OPTIONS_BEFORE.sub("", value)).strip().replace("\\", "/")
 
 
 def _picture(path: Path) -> NDArray[np.uint8]:

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.text_file import without_mark
 from runtime.characters.character import Material
+from runtime.characters.formats.beside import beside
 from runtime.characters.formats.mesh_data import (
     FileMesh,
     MeshError,
@@ -18,6 +21,8 @@ from runtime.characters.formats.mtl import read_mtl
 from runtime.characters.formats.obj_lines import ObjContent, parse_obj
 from runtime.characters.formats.polygons import cut_polygons
 from runtime.characters.palette import linear_from_srgb
+
+_LIBRARY = re.compile(r"\S.*?\.mtl(?=\s|$)", re.IGNORECASE)
 
 
 def read_obj(content: bytes, folder: Path) -> FileMesh:
@@ -34,7 +39,7 @@ def read_obj(content: bytes, folder: Path) -> FileMesh:
     Raises:
         MeshError: a line is damaged, or there are no faces, or too many.
     """
-    read = parse_obj(content)
+    read = parse_obj(without_mark(content))
     check_counts(len(read.positions), len(read.sizes))
     materials, notes = _materials(read, folder)
     if read.short_faces:
@@ -68,8 +73,8 @@ def _materials(read: ObjContent, folder: Path) -> tuple[tuple[Material, ...], li
     """
     library: dict[str, Material] = {}
     notes: list[str] = []
-    for name in read.libraries:
-        found, said = read_mtl(folder / name.replace("\\", "/"))
+    for path in _library_files(read.libraries, folder):
+        found, said = read_mtl(path)
         library |= found
         notes += said
     uncommented = {_uncommented(name): material for name, material in library.items()}
@@ -78,6 +83,23 @@ def _materials(read: ObjContent, folder: Path) -> tuple[tuple[Material, ...], li
         for name in read.materials
     ]
     return tuple(chosen), notes
+
+
+def _library_files(lines: tuple[str, ...], folder: Path) -> list[Path]:
+    """The material libraries that `mtllib` lines name: one, with blanks in its name, or several."""
+    files: list[Path] = []
+    for line in lines:
+        several = _LIBRARY.findall(line) or [line]
+        for name in [line] if _beside(folder, line) else several:
+            files.append(_beside(folder, name) or folder / Path(name.replace("\\", "/")).name)
+    return list(dict.fromkeys(files))
+
+
+def _beside(folder: Path, name: str) -> Path | None:
+    try:
+        return beside(folder, name)
+    except (OSError, ValueError):  # a name that no file can have
+        return None
 
 
 def _uncommented(name: str) -> str:

@@ -236,12 +236,20 @@ def _floats(rows: _Words, columns: range, keyword: str) -> Floats:
                 words = rows.words[column::size]
             else:
                 words = [rows.words[start] for start in (starts + column).tolist()]
-            numbers[:, place] = np.fromiter(map(float, words), np.float64, count)
+            numbers[:, place] = _as_numbers(words)
     except ValueError:
         raise MeshError(
             f"a {keyword} line does not have {len(columns)} numbers; it is damaged"
         ) from None
     return numbers
+
+
+def _as_numbers(words: list[str]) -> Floats:
+    """Words as numbers, with decimal points or, as some programs write them, commas."""
+    try:
+        return np.fromiter(map(float, words), np.float64, len(words))
+    except ValueError:
+        return np.array([float(word.replace(",", ".")) for word in words])
 
 
 def _corners(words: list[str]) -> Indices:

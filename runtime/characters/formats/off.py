@@ -7,6 +7,7 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.text_file import without_mark
 from runtime.characters.formats.mesh_data import FileMesh, MeshError, check_counts
 from runtime.characters.formats.polygons import cut_polygons
 from runtime.characters.palette import linear_from_srgb
@@ -28,7 +29,7 @@ def read_off(content: bytes) -> FileMesh:
     """
     lines = [
         line.split()
-        for raw in content.decode("latin-1").splitlines()
+        for raw in without_mark(content).decode("latin-1").splitlines()
         if (line := raw.split("#", 1)[0].strip())
     ]
     if not lines:

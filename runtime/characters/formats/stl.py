@@ -7,6 +7,7 @@ import re
 import numpy as np
 from numpy.typing import NDArray
 
+from replay.text_file import without_mark
 from runtime.characters.formats.mesh_data import FileMesh, MeshError, check_counts
 
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
@@ -19,6 +20,7 @@ def read_stl(content: bytes) -> FileMesh:
     Raises:
         MeshError: the file is damaged or cut short, or has too many triangles.
     """
+    content = without_mark(content)
     corners = _binary(content) if _looks_binary(content) else _ascii(content)
     positions, first, inverse = np.unique(
         corners.reshape(-1, 3) + 0.0, axis=0, return_index=True, return_inverse=True
@@ -48,7 +50,7 @@ def _binary(content: bytes) -> NDArray[np.float64]:
 
 
 def _ascii(content: bytes) -> NDArray[np.float64]:
-    found = _VERTEX.findall(content)
+    found = _VERTEX.findall(content.replace(b",", b"."))  # decimal commas
     if b"endsolid" not in content[-4096:].lower():
         raise MeshError("it has no endsolid: it is cut short; export it again")
     if not found or len(found) % 3:

@@ -168,7 +168,7 @@ def test_materials_hold_until_the_next_line_that_names_one(
         ("f -1 2 -99999999999999999999999", "a face names a vertex"),
         ("f 1 2 0", "not among the 3"),
         ("v 0 0", "a v line does not have 3 numbers"),
-        ("v 0 0 1,5", "a v line does not have 3 numbers"),
+        ("v 0 0 1;5", "a v line does not have 3 numbers"),
     ],
 )
 def test_a_damaged_line_is_refused(line: str, says: str, tmp_path: Path) -> None:
