@@ -17,6 +17,7 @@ from typing import Protocol, Self
 import numpy as np
 
 from devices.skeleton import Skeleton, SkeletonFrame
+from replay.false_start import without_false_start
 from replay.playback import Playback
 from replay.recording import Recording
 
@@ -192,6 +193,10 @@ class Player:
         steps = np.diff(recording.times)
         steps = steps[steps > 0]
         self._step = float(np.median(steps)) if len(steps) else LONE_FRAME_SECONDS
+
+    def leave_out_false_start(self) -> None:
+        """Show the first frame that belongs to the rest in place of those before it."""
+        self.recording = without_false_start(self.recording)
 
     @property
     def skeleton(self) -> Skeleton:

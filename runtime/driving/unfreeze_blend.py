@@ -3,7 +3,8 @@
 The blend changes the pose that the puppets follow, after conditioning. Matching, publishing and
 filters see the performer's own pose. Each bone turns the short way in the body's own frame, and so
 does the heading of the whole, so that no limb collapses: halfway between an arm that was up and an
-arm that is down lies an arm that is stretched out, not a point.
+arm that is down lies an arm that is stretched out, not a point. The rotations of joints turn the
+same way, so that heads and hands ease too.
 """
 
 from __future__ import annotations
@@ -36,12 +37,15 @@ class _Offset:
         turns: (J, 3) [rad] rotation vectors from each joint's bone to the bone shown, in the
             body's frame.
         lengths: (J, 3) [m] the difference that remains after the turn.
+        rotations: (J, 3) [rad] rotation vectors from each joint's rotation to the rotation shown,
+            in the body's frame; zero where one is unknown.
         heading: [rad] in [-pi, pi).
         hips: (3,) [m].
     """
 
     turns: Array
     lengths: Array
+    rotations: Array
     heading: float
     hips: Array
 
@@ -147,6 +151,7 @@ class UnfreezeBlend:
         return _Offset(
             turns=turns,
             lengths=wanted - Rotation.from_rotvec(turns).apply(bones),
+            rotations=_rotations_between(pose, shown),
             heading=(shown.heading - pose.heading + np.pi) % (2.0 * np.pi) - np.pi,
             hips=shown.hips - pose.hips,
         )
@@ -165,7 +170,8 @@ class UnfreezeBlend:
         places -= places[self._hips]
         heading, hips = pose.heading + offset.heading * left, pose.hips + offset.hips * left
         seen = turned(places, heading, np.zeros(3)) + hips
-        return replace(pose, seen=seen, heading=heading, hips=hips)
+        rotations = _turned_rotations(pose, offset.rotations * left, heading)
+        return replace(pose, seen=seen, heading=heading, hips=hips, rotations=rotations)
 
 
 def shortest_turns(bones: Array, wanted: Array) -> Array:
@@ -189,6 +195,37 @@ def shortest_turns(bones: Array, wanted: Array) -> Array:
     shares = np.divide(angles, lengths, out=np.zeros(len(axes)), where=lengths > least)
     turns: Array = axes * shares[:, None]
     return turns
+
+
+def _rotations_between(pose: Pose, shown: Pose) -> Array:
+    """Rotation vectors (J, 3) [rad] from the rotations of a pose to those shown, facing +Z."""
+    turns = np.zeros((len(pose.seen), 3))
+    if pose.rotations is not None and shown.rotations is not None:
+        known = np.isfinite(pose.rotations + shown.rotations).all(axis=1)
+        if known.any():
+            own, wanted = (
+                _about_vertical(-each.heading) * Rotation.from_quat(rotations[known])
+                for each, rotations in ((pose, pose.rotations), (shown, shown.rotations))
+            )
+            turns[known] = (wanted * own.inv()).as_rotvec()
+    return turns
+
+
+def _turned_rotations(pose: Pose, turns: Array, heading: float) -> Array | None:
+    """The rotations (J, 4) of a pose after turns (J, 3) [rad] in its frame, at another heading."""
+    if pose.rotations is None:
+        return None
+    out = pose.rotations.copy()
+    known = np.isfinite(out).all(axis=1)
+    if known.any():
+        own = _about_vertical(-pose.heading) * Rotation.from_quat(out[known])
+        turned_on = Rotation.from_rotvec(turns[known]) * own
+        out[known] = (_about_vertical(heading) * turned_on).as_quat()
+    return out
+
+
+def _about_vertical(angle: float) -> Rotation:
+    return Rotation.from_rotvec([0.0, angle, 0.0])
 
 
 def _same(rests: Sequence[Rest | None], before: Sequence[Rest | None]) -> bool:

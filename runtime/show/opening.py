@@ -87,6 +87,9 @@ class OpenedShow:
         self._source = stream
         self._stream = closing.enter_context(RecordedStream(stream))
         _check(characters, settings)
+        playback = playback_of(stream)
+        if isinstance(playback, Player) and settings.match.driver != "relative":
+            playback.leave_out_false_start()
         self._make_driver = make_driver or _driver(settings.match)
         if self._make_driver in LIMB_BY_LIMB and settings.match.mapping is None:
             characters = [character.limb_by_limb for character in characters]

@@ -136,7 +136,7 @@ class BodyDriver:
         self._origin = self._middle_of(clip[0]) if clip else None
         self.reset()
         self._upright = self._upright_at_rest
-        known = bool(clip) and self._joint_turns.learn(clip[0])
+        known = self._joint_turns.learn(clip)
         if rest is not None and not known:
             step = max(len(clip) // _MEASURED, 1)
             shown = [pose.facing(self._facing) for pose in clip[::step]]

@@ -14,6 +14,8 @@ from solvers.skeleton.quaternions import multiply
 
 Array = NDArray[np.float64]
 
+_OTHERS = 8  # poses that are looked at where the first one shows nothing
+
 
 class JointTurns:
     """The turns of some joints from the performer standing upright.
@@ -56,12 +58,24 @@ class JointTurns:
         turns[known] = turned[known]
         return turns
 
-    def learn(self, pose: Pose) -> bool:
-        """Find out from a pose what the rotations mean; return whether they can be used."""
-        if pose.rotations is None:
-            return False
-        self._fitted = self._fit(pose, pose.rotations)
-        return bool(self._fitted.is_usable.any())
+    def learn(self, clip: Sequence[Pose]) -> bool:
+        """Find out from poses what the rotations mean; return whether they can be used.
+
+        The first pose comes first, as it may be the rest pose itself. Where it does not explain
+        half of the joints that it shows, the best of others does.
+        """
+        step = max(len(clip) // _OTHERS, 1)
+        best = 0
+        for pose in [*clip[:1], *clip[step::step]]:
+            if pose.rotations is None:
+                continue
+            fitted = self._fit(pose, pose.rotations)
+            usable = int(fitted.is_usable.sum())
+            if usable > best or self._fitted is None:
+                self._fitted, best = fitted, usable
+            if 2 * best >= len(self._performer.names):
+                break
+        return best > 0
 
     def _fit(self, pose: Pose, rotations: Array) -> RestTurn:
         rest, parents = self._performer.rest_positions, self._performer.parents

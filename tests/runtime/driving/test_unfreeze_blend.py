@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -102,6 +103,27 @@ def test_every_bone_nears_its_place_and_keeps_its_length() -> None:
     assert (np.diff(cosines, axis=0) > -1e-12).all(), "and none ever back"
     angles = np.arccos(np.clip(cosines, -1.0, 1.0))
     assert angles[STEPS // 2].max() == pytest.approx(angles[0].max() / 2.0, abs=1e-6)
+
+
+def test_rotations_ease_with_the_bones() -> None:
+    """A head that was turned while the characters were frozen does not snap."""
+    held, target = followed(pose(heading=0.4)), followed(pose(heading=-0.3))
+    turns = Rotation.from_rotvec([[0.0, 1.2, 0.0]] * len(BODY.names))
+    held = replace(held, rotations=(Rotation.from_rotvec([0.0, 0.4, 0.0]) * turns).as_quat())
+    own = Rotation.from_rotvec([[0.0, -0.3, 0.0]] * len(BODY.names)).as_quat()
+    own[3] = np.nan
+    target = replace(target, rotations=own)
+    times = 2.0 + np.linspace(0.0, SECONDS, STEPS + 1)
+    eased = let_go(held, target, times)
+    yaws = []
+    for each in eased:
+        assert each.rotations is not None
+        assert np.isnan(each.rotations[3]).all()
+        yaws.append(Rotation.from_quat(each.rotations[0]).as_rotvec()[1])
+    assert yaws[0] == pytest.approx(1.6, abs=0.02)
+    assert yaws[-1] == pytest.approx(-0.3, abs=1e-9)
+    assert np.abs(np.diff(yaws)).max() < 3.0 * 1.9 / STEPS
+    assert (np.diff(yaws) < 0.0).all()
 
 
 @pytest.mark.parametrize(("start", "end"), [(3.0, -3.0), (-2.5, 2.9), (0.4, 1.9), (7.0, 0.2)])

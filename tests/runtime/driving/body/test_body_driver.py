@@ -15,9 +15,11 @@ from scipy.spatial.transform import Rotation
 from devices.bodies.plan_by_names import plan_by_names
 from devices.errors import InputError
 from devices.skeleton import Skeleton, SkeletonFrame
+from replay.builtin import builtin_recording
 from replay.formats import read_recording
 from runtime.characters.character import Character
 from runtime.driving.body.body_driver import BodyDriver
+from runtime.driving.body.joint_turns import JointTurns
 from runtime.driving.drivers import best_driver
 from runtime.driving.mapping import Mapping
 from runtime.driving.pairing import Pairing
@@ -25,6 +27,8 @@ from runtime.driving.performer import Performer, Pose, rest_state
 from runtime.driving.polyline_driver import PolylineDriver
 from runtime.driving.targets import PosedNodes
 from runtime.puppet.puppet import Puppet
+from runtime.show.open_stream import play
+from runtime.show.show import Show
 from solvers.retarget.heading import turned
 from tests.runtime.stick_figures import ARMS, BODY, frame, make_figure, node, paired, pose
 
@@ -290,3 +294,34 @@ def test_who_lends_one_arm_turns_no_trunk() -> None:
     turned_by = Rotation.from_quat(targets.nodes.rotations).magnitude()
     assert turned_by[[node("pelvis"), node("chest"), node("head"), node("wrist.R")]].max() < 1e-9
     assert turned_by[node("shoulder.L")] > 0.3
+
+
+def test_a_bad_first_frame_spoils_neither_the_way_nor_the_turns_of_a_clip() -> None:
+    """All joints in one point at the origin, far from the stage; no rotation means anything."""
+    clean = builtin_recording("walk")
+    positions = clean.positions + np.array([3.0, 0.0, 1.0])
+    spoilt = positions.copy()
+    spoilt[0] = 0.0
+    stood = []
+    for places in (positions, spoilt):
+        recording = replace(clean, positions=places)
+        with Show(play(recording, every_frame=True), [body()]) as show:
+            while not show.ended:
+                show.tick()
+                show.settle()
+            assert show.motions[0].nodes is not None
+            stood.append(show.motions[0].nodes.positions)
+    np.testing.assert_allclose(stood[1], stood[0], atol=0.01)
+
+
+def test_rotations_are_understood_where_the_first_pose_has_none() -> None:
+    performer = Performer(BODY)
+    rotations = np.tile([0.0, 0.0, 0.0, 1.0], (len(BODY.names), 1))
+    blind, seen = frame(pose(), 0.0), frame(pose(), 0.1)
+    clip = [
+        performer.follow(SkeletonFrame(each.time, each.positions, own, each.confidence))
+        for each, own in ((blind, rotations * np.nan), (seen, rotations))
+    ]
+    turns = JointTurns(BODY, [BODY.index("Head")], 0.0, 0.0)
+    assert turns.learn(clip)
+    assert turns.turns(clip[1], 0.0).any()
