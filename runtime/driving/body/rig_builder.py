@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 
 _DOWN = np.array([0.0, -1.0, 0.0])
 LOW = 0.15  # of the height: a limb that ends lower stands on the floor
+_STANDS = 0.5  # cosine of the angle to the vertical beyond which a leg from hip to ankle lies
 _BESIDE = 0.35  # of the forearm: bones that begin this near to the wrist are parts of the hand
 
 
@@ -42,13 +43,17 @@ class RigBuilder:
     def drive_of(self, limbs: Iterable[Limb], least_upright: float) -> str:
         """How a pair of limbs is driven: relative if it stands on the floor, and bends at rest.
 
+        Legs that lie on the floor, as of a toy that sits, do not stand: they point.
+
         Args:
             limbs: the pair.
             least_upright: cosine of the angle to the vertical beyond which a segment leans.
         """
         low = self._rest[:, 1].min() + LOW * np.ptp(self._rest[:, 1])
         for limb in limbs:
-            stands = self._rest[limb.segments[-1][-1], 1] < low
+            whole = (limb.upper[0], (limb.lower or limb.upper)[-1])
+            upright = float(_direction(self._rest, whole) @ _DOWN) > _STANDS
+            stands = upright and self._rest[limb.segments[-1][-1], 1] < low
             leans = any(
                 _direction(self._rest, chain) @ _DOWN < least_upright
                 for chain in (limb.upper, limb.lower)
