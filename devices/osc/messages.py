@@ -19,6 +19,7 @@ DEEPEST = 8  # nested bundles
 MOST_ARGUMENTS = 4096
 _LONGEST_TAGS = 64  # characters of type tags up to which a plan is cached
 _NUMBERS = {"i": "i", "f": "f", "h": "q", "t": "Q", "d": "d"}
+_ANY_NUMBER = "fdih"
 _CONSTANTS: dict[str, Argument] = {"T": True, "F": False, "N": None, "I": float("inf")}
 
 
@@ -40,6 +41,18 @@ class Message:
     address: str
     tags: str
     arguments: tuple[Argument, ...]
+
+    def begins(self, tags: str) -> bool:
+        """Whether the arguments begin with these types; any number is an f or an i.
+
+        python-osc sends whole numbers as ints, other senders all numbers as doubles.
+        """
+        if self.tags.startswith(tags):
+            return True
+        return len(self.tags) >= len(tags) and all(
+            own == wanted or (wanted in _ANY_NUMBER and own in _ANY_NUMBER)
+            for own, wanted in zip(self.tags, tags, strict=False)
+        )
 
 
 def read_packet(data: bytes) -> list[Message]:

@@ -138,9 +138,8 @@ class VmcDecoder:
         for item in items:
             if not isinstance(item, Message):
                 continue
-            if item.address == "/VMC/Ext/T" and item.tags[:1] == "f":
-                time = item.arguments[0]
-                assert isinstance(time, float)
+            if item.address == "/VMC/Ext/T" and item.begins("f"):
+                time = float(item.arguments[0])  # type: ignore[arg-type]  # a number, by its tag
                 return 0.0 < self._time - time <= STEP_BACK
         return False
 
@@ -167,7 +166,7 @@ class VmcDecoder:
     # Handlers of the messages; they return False for a refused message.
 
     def _bone(self, message: Message, arrival: float) -> bool:
-        if not message.tags.startswith(POSE_TAGS):
+        if not message.begins(POSE_TAGS):
             return False
         name, *numbers = message.arguments[:8]
         joint = bone_called(str(name))
@@ -183,7 +182,7 @@ class VmcDecoder:
         return True
 
     def _root(self, message: Message, arrival: float) -> bool:
-        if not message.tags.startswith(POSE_TAGS):
+        if not message.begins(POSE_TAGS):
             return False
         pose = checked_pose(message.arguments[1:8])  # type: ignore[arg-type]  # `_checked` refuses what is no number
         if pose is None:
@@ -196,7 +195,7 @@ class VmcDecoder:
         return True
 
     def _tracker(self, message: Message, arrival: float) -> bool:
-        if not message.tags.startswith(POSE_TAGS):
+        if not message.begins(POSE_TAGS):
             return False
         pose = checked_pose(message.arguments[1:8])  # type: ignore[arg-type]  # `_checked` refuses what is no number
         if pose is None:
@@ -218,10 +217,9 @@ class VmcDecoder:
         return bone_of_tracker(serial)
 
     def _take_time(self, message: Message, arrival: float) -> bool:
-        if not message.tags.startswith("f"):
+        if not message.begins("f"):
             return False
-        time = message.arguments[0]
-        assert isinstance(time, float)
+        time = float(message.arguments[0])  # type: ignore[arg-type]  # a number, by its tag
         if not math.isfinite(time):
             return False
         self._mark()
@@ -232,16 +230,16 @@ class VmcDecoder:
         return True
 
     def _status(self, message: Message, arrival: float) -> bool:
-        tags, arguments = message.tags, message.arguments
-        if not tags.startswith("i"):
+        arguments = message.arguments
+        if not message.begins("i"):
             return False
         self._mark()
         self._valid = arguments[0] != 0
-        self._tracking = not tags.startswith("iiii") or arguments[3] != 0
+        self._tracking = not message.begins("iiii") or arguments[3] != 0
         return True
 
     def _blend(self, message: Message, arrival: float) -> bool:
-        if not message.tags.startswith("sf"):
+        if not message.begins("sf"):
             return False
         name, value = message.arguments[:2]
         weight = blend_weight(name, value)

@@ -124,7 +124,7 @@ class VrchatDecoder:
 
 def _three(message: Message, most: float) -> NDArray[np.float64] | None:
     """The three numbers of a message; None if there are not three or one is implausible."""
-    if not message.tags.startswith("fff"):
+    if not message.begins("fff"):
         return None
     values = np.array(message.arguments[:3], dtype=np.float64)
     return values if (np.abs(values) < most).all() else None  # None for NaN

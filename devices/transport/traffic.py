@@ -36,6 +36,22 @@ class Traffic:
     last_seen: float = float("nan")
     trouble: str = ""
 
+    def unused(self, address: str) -> str:
+        """Why no frame came from a device, in one line; empty if frames came.
+
+        Args:
+            address: of the device, as it was opened.
+        """
+        if self.frames:
+            return ""
+        if not self.packets:
+            return f"nothing came from {address}" + (f": {self.trouble}" if self.trouble else "")
+        refused = f", {self.refused} of their parts were refused" if self.refused else ""
+        return (
+            f"{self.packets} packets came from {address}, and none held a performer's frame"
+            f"{refused}; does the sender speak {address.partition(':')[0]}?"
+        )
+
 
 class Rhythm:
     """Arrivals of the newest frames; one thread notes them, any other reads them."""

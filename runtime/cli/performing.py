@@ -51,6 +51,9 @@ def perform(
             characters = [load_character(name) for name in options.character]
         with Show(stream, characters, settings, pace=AtOnce() if options.fast else None) as show:
             _run(show, stream)
+        traffic = getattr(stream, "traffic", None)
+        if traffic is not None and (why := traffic.unused(origin)):
+            messages.warn(why)
     return 0
 
 

@@ -34,7 +34,8 @@ def run(options: argparse.Namespace) -> int:
     """Write every frame that comes until Ctrl-C or `--seconds`.
 
     Raises:
-        InputError: the device cannot be opened, or the disk fails; the frames until then are kept.
+        InputError: the device cannot be opened, no frame came from it, or the disk fails; the
+            frames until then are kept.
     """
     from devices.errors import InputError
     from devices.stream import open_stream
@@ -60,8 +61,12 @@ def run(options: argparse.Namespace) -> int:
                 recorder.close()
             lost = f", {recorder.lost} lost" if recorder.lost else ""
             say(f"{recorder.frames} frames in {options.out}{lost}")
+        traffic = getattr(stream, "traffic", None)
     if recorder.fault:
         raise InputError(recorder.fault)
+    if recorder.frames == 0:
+        why = "" if traffic is None else traffic.unused(options.device)
+        raise InputError(f"nothing was recorded: {why or 'no frame came'}")
     return 0
 
 

@@ -57,7 +57,7 @@ def test_python_oscs_client_is_heard() -> None:
     def send(number: int) -> None:
         client.send_message("/VMC/Ext/Root/Pos", ["root", *[0.0] * 6, 1.0])
         for name in ("Hips", "Spine", "LeftUpperLeg"):
-            client.send_message("/VMC/Ext/Bone/Pos", [name, -9.5, 1, 0, 0, 0, 0, 1])  # integers
+            client.send_message("/VMC/Ext/Bone/Pos", [name, *"9000001"])  # texts
             client.send_message("/VMC/Ext/Bone/Pos", [name, -0.5, 1.0, 0.25, 0.0, 0.0, 0.0, 1.0])
         client.send_message("/VMC/Ext/OK", 1)
         client.send_message("/VMC/Ext/T", number / 60)

@@ -120,7 +120,7 @@ def test_places_can_be_given() -> None:
     "bad",
     [
         message("/tracking/trackers/1/position", 1.0, 2.0),
-        message("/tracking/trackers/1/position", 1, 2, 3),
+        message("/tracking/trackers/1/position", "1", "2", "3"),
         message("/tracking/trackers/1/position", math.nan, 0.0, 0.0),
         message("/tracking/trackers/1/position", 1e30, 0.0, 0.0),
         message("/tracking/trackers/head/rotation", math.inf, 0.0, 0.0),
