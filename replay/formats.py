@@ -8,6 +8,7 @@ from pathlib import Path
 
 from devices.errors import InputError
 from replay.bvh.reader import read_bvh, recognises_bvh
+from replay.foreign import conversion_hint
 from replay.joint_table import read_joint_table, recognises_joint_table
 from replay.kinect.azure_csv import read_azure_csv, recognises_azure_csv
 from replay.kinect.azure_json import read_azure_json, recognises_azure_json
@@ -119,6 +120,8 @@ def recognise(path: Path) -> RecordingFormat:
     for candidate in formats():
         if candidate.recognises(path, head):
             return candidate
+    if (hint := conversion_hint(path, head)) is not None:
+        raise InputError(f"{path}: {hint}")
     known = ", ".join(candidate.name for candidate in formats())
     raise InputError(f"{path} is not a recording that can be read; known formats: {known}")
 

@@ -1,0 +1,62 @@
+"""Formats of motion that are known and not read: what to convert them with, in one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+_BLENDER_BVH = "open it in Blender (File, Import) and export BVH (File, Export, Motion Capture)"
+_MARKERS = "fit a skeleton to its markers where they were captured (Motive, Vicon) and export BVH"
+_HINTS = {
+    ".fbx": ("FBX", _BLENDER_BVH),
+    ".dae": ("COLLADA", _BLENDER_BVH),
+    ".glb": ("glTF animation", _BLENDER_BVH),
+    ".gltf": ("glTF animation", _BLENDER_BVH),
+    ".vrma": ("VRM animation", "open it in Blender with the VRM add-on and export BVH"),
+    ".blend": ("Blender file", "open it in Blender and export BVH (File, Export, Motion Capture)"),
+    ".vmd": ("MikuMikuDance motion", "open it in Blender with mmd_tools and export BVH"),
+    ".c3d": ("C3D markers", _MARKERS),
+    ".trc": ("TRC markers", _MARKERS),
+    ".asf": ("ASF/AMC", "convert the pair to BVH with amc2bvh, or import it into Blender"),
+    ".amc": ("ASF/AMC", "convert the pair to BVH with amc2bvh, or import it into Blender"),
+    ".mvnx": ("Xsens MVNX", "export BVH from Xsens MVN (File, Export)"),
+    ".mvn": ("Xsens MVN", "export BVH from Xsens MVN (File, Export)"),
+    ".npz": (
+        "NumPy archive",
+        "convert SMPL or AMASS motion to BVH with the SMPL add-on of Blender",
+    ),
+    ".tak": ("OptiTrack take", "export BVH from Motive (File, Export Tracking Data)"),
+    ".usd": ("USD", _BLENDER_BVH),
+    ".abc": ("Alembic", "it holds no skeleton; export the motion as BVH where it was made"),
+}
+_STARTS = (
+    (b"Kaydara FBX Binary", ".fbx"),
+    (b"; FBX", ".fbx"),
+    (b"glTF", ".glb"),
+    (b"Vocaloid Motion Data", ".vmd"),
+    (b"PathFileType", ".trc"),
+    (b"# AST/ASF", ".asf"),
+    (b":FULLY-SPECIFIED", ".amc"),
+    (b"BLENDER", ".blend"),
+)
+_INSIDE = ((b"<COLLADA", ".dae"), (b"<mvnx", ".mvnx"), (b'"people"', "openpose"))
+_HINTS["openpose"] = (
+    "OpenPose JSON",
+    "its points are flat; lift them to 3D and save them as MediaPipe's landmarks",
+)
+_HINTS["optitrack"] = ("OptiTrack table", "export BVH from Motive (File, Export Tracking Data)")
+
+
+def conversion_hint(path: Path, head: bytes) -> str | None:
+    """What a file is, and what makes a recording of it; None where the format is not known.
+
+    Args:
+        path: of the file; its suffix counts where its content says nothing.
+        head: its first bytes.
+    """
+    start = head.lstrip(b"\xef\xbb\xbf \t\r\n")
+    kind = next((kind for mark, kind in _STARTS if start.startswith(mark)), None)
+    kind = kind or next((kind for mark, kind in _INSIDE if mark in head), None)
+    if kind is None and start.startswith(b"Format Version,"):
+        kind = "optitrack"
+    what = _HINTS.get(kind or path.suffix.lower())
+    return None if what is None else f"{what[0]} is not read; {what[1]}"

@@ -1,0 +1,48 @@
+"""Formats that are known and not read are answered with what converts them, in one line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from devices.errors import InputError
+from replay.formats import read_recording
+from runtime.characters.character_file import read_character
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "says"),
+    [
+        ("a.fbx", b"Kaydara FBX Binary  \0\x1a\0", "FBX is not read; open it in Blender"),
+        ("walk", b"Kaydara FBX Binary  \0\x1a\0", "FBX is not read"),
+        ("a.fbx", b"; FBX 7.4.0 project file\n", "FBX is not read"),
+        ("a.glb", b"glTF\2\0\0\0", "glTF animation is not read"),
+        ("a.vrma", b"glTF\2\0\0\0", "glTF animation is not read"),
+        ("a.vmd", b"Vocaloid Motion Data 0002\0", "mmd_tools"),
+        ("a.c3d", b"\2\x50\1\2\3", "C3D markers is not read"),
+        ("a.trc", b"PathFileType\t4\t(X/Y/Z)\ta.trc\n", "TRC markers is not read"),
+        ("a.amc", b"#!OML:ASF\n:FULLY-SPECIFIED\n", "ASF/AMC is not read"),
+        ("a.mvnx", b'<?xml version="1.0"?>\n<mvnx version="4">', "Xsens MVN"),
+        ("a.dae", b"<?xml?><COLLADA>", "COLLADA is not read"),
+        ("a.json", b'{"version":1.3,"people":[{"pose_keypoints_2d":[1,2,3]}]}', "OpenPose"),
+        ("a.csv", b"Format Version,1.23,Take Name,a\n", "Motive"),
+        ("a.npz", b"PK\3\4", "NumPy archive"),
+    ],
+)
+def test_other_motion_is_answered_with_a_way(
+    name: str, content: bytes, says: str, tmp_path: Path
+) -> None:
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=says) as refused:
+        read_recording(path)
+    assert "BVH" in str(refused.value) or "MediaPipe" in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("name", ["a.fbx", "A.PMX", "a.dae", "a.blend"])
+def test_other_characters_are_answered_with_a_way(name: str, tmp_path: Path) -> None:
+    (tmp_path / name).write_bytes(b"x")
+    with pytest.raises(InputError, match=r"is not read; open it in Blender.* export glb"):
+        read_character(tmp_path / name)
