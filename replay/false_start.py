@@ -55,7 +55,7 @@ def _first_true(times: Array, positions: Array) -> int:
         times: (T,) [s]
         positions: (n, J, 3) [m] of the first n of these frames; NaN where not seen.
     """
-    seen: Bools = np.isfinite(positions).all(axis=2)
+    seen: Bools = np.asarray(np.isfinite(positions).all(axis=2))
     count, extent = seen.sum(axis=1), _extents(positions, seen)
     usual, size = np.median(count[MOST:]), np.median(extent[MOST:])
     is_whole = (count > SEEN * usual) & (extent > COLLAPSED * size)

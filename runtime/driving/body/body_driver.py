@@ -27,6 +27,7 @@ from runtime.driving.targets import PosedNodes, Targets
 from solvers.retarget.heading import turned
 from solvers.retarget.joint_rotations import RestTurn
 from solvers.retarget.limb_posing import pose_limbs
+from solvers.retarget.steady_ends import SteadyEnds, SteadyEndsState
 from solvers.retarget.trunk_turns import UPRIGHT, trunk_turns
 from solvers.skeleton.quaternions import between, multiply, rotate
 
@@ -49,6 +50,7 @@ class BodyState:
         nodes: the posed nodes.
         rest_turn: what the performer's rotations mean.
         footing: of the feet.
+        ends: of hands and feet.
     """
 
     rest: Rest | None
@@ -59,6 +61,7 @@ class BodyState:
     nodes: PosedNodes
     rest_turn: RestTurn | None
     footing: FootingState
+    ends: SteadyEndsState
 
 
 class BodyDriver:
@@ -109,6 +112,7 @@ class BodyDriver:
         self._left = np.array([np.cos(bodies.facing), 0.0, -np.sin(bodies.facing)])
         vertices, owner = pairing.surface.rest, skeleton.skin.nodes[:, 0]
         self._footing = Footing(bodies, parts, vertices, owner)
+        self._ends = _ends(bodies)
         self._rearing = Rearing(bodies)
         self._long_arms = LongArms(bodies.tree, vertices, owner, parts.arms, parts.legs)
         self._at_rest = Targets(skeleton.skinned(skeleton.rest_nodes), nodes=skeleton.rest_nodes)
@@ -152,6 +156,7 @@ class BodyDriver:
             return self._at_rest
         heading = pose.heading if self._goes_along else rest.heading
         joints = turned(pose.seen, self._facing - heading, pose.hips)
+        self._ends.steady(joints, pose.time)
         self._trunk = trunk_turns(joints, self._parts.trunk, self._upright, self._trunk)
         rotations, positions = np.empty((len(rig.order), 4)), np.empty((len(rig.order), 3))
         own = self._joint_turns.turns(pose, heading)
@@ -250,6 +255,7 @@ class BodyDriver:
         self._twists = np.zeros(len(self._parts.rig.near))
         self._nodes = self._skeleton.rest_nodes
         self._footing.reset()
+        self._ends.reset()
 
     @property
     def highlights(self) -> list[Highlight]:
@@ -271,6 +277,7 @@ class BodyDriver:
             self._nodes,
             self._joint_turns.snapshot(),
             self._footing.snapshot(),
+            self._ends.snapshot(),
         )
 
     def restore(self, state: BodyState) -> None:
@@ -280,6 +287,7 @@ class BodyDriver:
         self._twists, self._upright = state.twists.copy(), state.upright
         self._joint_turns.restore(state.rest_turn)
         self._footing.restore(state.footing)
+        self._ends.restore(state.ends)
 
 
 def _two_bodies(pairing: Pairing) -> tuple[TwoBodies, float]:
@@ -306,6 +314,13 @@ def _two_bodies(pairing: Pairing) -> tuple[TwoBodies, float]:
         facing=facing,
     )
     return bodies, heading_at_rest
+
+
+def _ends(bodies: TwoBodies) -> SteadyEnds:
+    """The performer's hands and feet."""
+    limbs = [*bodies.source.arms.values(), *bodies.source.legs.values()]
+    ends = [limb.end for limb in limbs if len(limb.end) > 1]
+    return SteadyEnds([end[0] for end in ends], [end[-1] for end in ends])
 
 
 class AbsoluteBodyDriver(BodyDriver):

@@ -62,6 +62,7 @@ REMEMBERS = {
     "solvers.retarget.foot_lock.FootLock",
     "solvers.retarget.hip_shift.HipShift",
     "solvers.retarget.sole_pitch.SolePitch",
+    "solvers.retarget.steady_ends.SteadyEnds",
     "solvers.retarget.match_hysteresis.MatchHysteresis",
     "solvers.signal.floor_plane.FloorFit",
     "solvers.signal.one_euro.OneEuroFilter",
