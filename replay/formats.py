@@ -21,6 +21,7 @@ from replay.leap.reader import read_leap, recognises_leap
 from replay.mcap.reader import read_mcap, recognises_mcap
 from replay.mediapipe.reader import read_mediapipe, recognises_mediapipe
 from replay.recording import Recording
+from replay.smpl import read_smpl, recognises_smpl
 from replay.stated import UNSTATED, Stated
 from replay.text_file import decoded, without_mark
 
@@ -97,6 +98,7 @@ def formats() -> tuple[RecordingFormat, ...]:
         RecordingFormat("Kinect v2, NTU RGB+D (.skeleton)", recognises_ntu, _certain(read_ntu)),
         RecordingFormat("Kinect v1, UTKinect-Action3D", recognises_ut, _certain(read_ut)),
         RecordingFormat("Kinect v1, MSR Action3D", recognises_msr, _certain(read_msr)),
+        RecordingFormat("SMPL motion, AMASS (.npz)", recognises_smpl, read_smpl),
         RecordingFormat("BVH", recognises_bvh, read_bvh),
     )
 
