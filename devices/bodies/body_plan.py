@@ -13,6 +13,7 @@ SEGMENTS_IN_WORDS: Mapping[str, tuple[str, str, str]] = {
     "leg": ("thigh", "shin", "foot"),
     "foreleg": ("upper foreleg", "lower foreleg", "forefoot"),
     "hind leg": ("thigh", "shin", "hind foot"),
+    "front leg": ("upper front leg", "lower front leg", "front foot"),
     "wing": ("inner wing", "outer wing", "wing tip"),
     "fin": ("inner fin", "outer fin", "fin tip"),
 }
@@ -63,6 +64,8 @@ class BodyPlan:
             for none.
         skull: the joint about which the head turns; None where `head` is empty.
         arms, legs: by side. Wings, fins and forelegs are arms.
+        more_legs: pairs of legs between arms and legs, from the front to the hind, each by side: of
+            a spider two, of an insect one.
         fingers: by side and kind, each from its knuckle to its tip.
         tail: from the trunk to its tip; empty for none.
         arm_word, leg_word: what people call its arms and legs: a key of `SEGMENTS_IN_WORDS`.
@@ -75,6 +78,7 @@ class BodyPlan:
     legs: Mapping[Side, Limb] = field(default_factory=dict)
     fingers: Mapping[tuple[Side, Kind], Chain] = field(default_factory=dict)
     tail: Chain = ()
+    more_legs: tuple[Mapping[Side, Limb], ...] = ()
     arm_word: str = "arm"
     leg_word: str = "leg"
 
@@ -97,5 +101,10 @@ class BodyPlan:
             **{f"{side} {word}": pair[side].chain for word, pair in limbs for side in pair},
             **{f"{side} {kind}": chain for (side, kind), chain in self.fingers.items()},
             "tail": self.tail,
+            **{
+                f"{side} leg {number}": pair[side].chain
+                for number, pair in enumerate(self.more_legs, 2)
+                for side in pair
+            },
         }
         return {words: chain for words, chain in parts.items() if chain}

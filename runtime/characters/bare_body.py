@@ -1,4 +1,4 @@
-"""Recognise the body of a mesh without a rig, whose skeleton was extracted from its surface."""
+"""Recognise a body whose joints have no names that say what they are, by its shape."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from devices.bodies.rest_heading import rest_heading
 from devices.skeleton import Skeleton
 from runtime.characters.body_nodes.body_nodes import body_nodes
 from runtime.characters.character import Character
+from runtime.characters.creatures.many_legs import plan_of_many_legs
 from runtime.characters.plan_by_shape import plan_by_shape
 from solvers.skeleton.limbs import surface_points
 from solvers.skeleton.mirror_plane import SYMMETRIC, MirrorPlane, mirror_planes
@@ -22,20 +23,22 @@ _PLANES = 4  # that are tried
 def with_body_by_shape(character: Character) -> Character:
     """Return the character with the plan of its body, None where the shape is not clear.
 
-    A limb that the skeleton hangs on the foot of its partner is hung on the trunk.
+    A limb that an extracted skeleton hangs on the foot of its partner is hung on the trunk.
     """
     points = surface_points(character.vertices, character.faces)
     if not np.ptp(points, axis=0).max() > 0.0:
         return character
     planes = mirror_planes(points, _PLANES)
     skeleton = character.skeleton
-    if planes and planes[0].asymmetry < SYMMETRIC:
+    if character.weights is None and planes and planes[0].asymmetry < SYMMETRIC:
         parents = rejoined(skeleton.tree, planes[0], float(np.ptp(points, axis=0).max()))
         if parents is not None:
             skeleton = Skeleton(skeleton.names, parents, skeleton.rest_positions)
-    plan = plan_by_shape(character.vertices, character.faces, skeleton.tree, planes)
-    if plan is None:
-        return replace(character, skeleton=skeleton)
+    surface = character.vertices, character.faces
+    plan = plan_by_shape(*surface, skeleton.tree, planes)
+    if plan is None or character.weights is not None:
+        plan = plan or plan_of_many_legs(*surface, skeleton.tree, planes)
+        return replace(character, skeleton=skeleton, plan=plan)
     body = body_nodes(
         character.vertices,
         character.faces,

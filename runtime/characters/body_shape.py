@@ -83,7 +83,7 @@ class BodyShape:
         """The roles of the pairs of limbs, or None where they are not clear."""
         if not self._halves.middle:
             return None
-        standing = [pair for pair in self._halves.pairs if self._stands(pair)]
+        standing = self.standing()
         if not standing:
             return self._on_one_foot()
         longest = self.length(standing[0])
@@ -91,6 +91,10 @@ class BodyShape:
         if len(legs) > 2 or not self._balanced(legs) or self._has_lonely_leg(longest):
             return None
         return self._on_four(legs[0], legs[1]) if len(legs) == 2 else self._on_two(legs[0])
+
+    def standing(self) -> list[LimbPair]:
+        """The pairs of limbs that reach the floor, the longest first."""
+        return [pair for pair in self._halves.pairs if self._stands(pair)]
 
     def length(self, pair: LimbPair) -> float:
         """The mean length [m] of the limbs of a pair, from the middle line."""

@@ -53,8 +53,7 @@ def _recognised(path: Path) -> Character:
     """
     character = split_parallel_bones(read_character(path))
     planned = _planned(character)
-    is_rig = planned.plan is not None or character.weights is not None
-    if is_rig or is_sheet(character.vertices, character.faces):
+    if planned.plan is not None or is_sheet(character.vertices, character.faces):
         return planned
     character = with_body_by_shape(character)
     return facing_the_audience(character) if path.suffix.lower() in MESH_SUFFIXES else character

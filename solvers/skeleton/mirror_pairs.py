@@ -26,6 +26,8 @@ _ASKEW = 0.14  # the greatest cost of theirs,
 _LONG = 0.3  # and the least length of the path between them
 _MIDDLE = 0.05  # the greatest distance of a tip of the middle line from the plane
 _FORK = 0.03  # a fork so much farther from the plane than another node may be the middle
+_DIGITS = 9  # of these distances, in which nodes in the plane are all alike
+_TOGETHER = 0.25  # of a limb: with so much of it in common, two limbs are one
 
 _SAMPLES = 16  # of a path that is compared with its mirror image
 _SHORTER = 0.5  # weight of the difference of two lengths
@@ -163,9 +165,7 @@ def _middle_line(
     for _, near, far in pairs:
         path = tree.chain(near, far)[1:-1]
         if path:
-            marks.append(
-                min(path, key=lambda node: abs(away[node]) - _FORK * (tree.degree[node] > 2))
-            )
+            marks.append(_middle_of(tree, path, away))
     inside = {node for _, near, far in pairs for node in tree.chain(near, far)}
     for tip in single:
         if abs(away[tip]) < _MIDDLE or not pairs:
@@ -178,11 +178,25 @@ def _middle_line(
     return {node for mark in marks for node in tree.chain(marks[0], mark)}
 
 
+def _middle_of(tree: Tree, path: Chain, away: Array) -> int:
+    """The node at which a path between two tips crosses the middle line.
+
+    It is near the plane, and a fork if it can be. Of several as good, as where the bones of a rig
+    lie in the plane, it is the one that halves the path.
+    """
+    points = tree.positions[list(path)]
+    along = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1)))
+    off = np.abs(along - along[-1] / 2.0)
+    fork = tree.degree[list(path)] > 2
+    cost = np.round(np.abs(away[list(path)]) - _FORK * fork, _DIGITS)
+    return path[int(np.lexsort((off, cost))[0])]
+
+
 def _limb_pairs(
     tree: Tree, middle: set[int], pairs: list[tuple[float, int, int]]
 ) -> list[LimbPair]:
     """Pairs of limbs: of the pairs of tips that leave the middle line together, the longest."""
-    groups: dict[int, LimbPair] = {}
+    groups: list[LimbPair] = []
     for cost, near, far in sorted(pairs):
         path = tree.chain(near, far)
         on_line = [index for index, node in enumerate(path) if node in middle]
@@ -191,19 +205,22 @@ def _limb_pairs(
         limb = LimbPair((tuple(reversed(path[: on_line[0] + 1])), path[on_line[-1] :]), cost)
         if min(map(len, limb.chains)) < 2:
             continue
-        key = _group_of(groups, limb)
-        if key is None:
-            groups[limb.chains[0][1]] = limb
-        elif _length(tree, limb) > _length(tree, groups[key]):
-            groups[key] = limb
-    return sorted(groups.values(), key=lambda limb: -_length(tree, limb))
+        group = _group_of(tree, groups, limb)
+        if group is None:
+            groups.append(limb)
+        elif _length(tree, limb) > _length(tree, groups[group]):
+            groups[group] = limb
+    return sorted(groups, key=lambda limb: -_length(tree, limb))
 
 
-def _group_of(groups: dict[int, LimbPair], limb: LimbPair) -> int | None:
-    """The group whose limbs leave the middle line by the same bone, on one side at least."""
-    for key, known in groups.items():
-        if any(a[:2] == b[:2] for a, b in zip(known.chains, limb.chains, strict=True)):
-            return key
+def _group_of(tree: Tree, groups: list[LimbPair], limb: LimbPair) -> int | None:
+    """The number of the pair that leaves the middle line together with this one, on one side."""
+    for group, known in enumerate(groups):
+        for one, other in zip(known.chains, limb.chains, strict=True):
+            shared = [a for a, b in zip(one, other, strict=False) if a == b]
+            least = _TOGETHER * min(tree.length(one), tree.length(other))
+            if len(shared) > 1 and tree.length(tuple(shared)) > least:
+                return group
     return None
 
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from devices.skeleton import Skeleton
+from runtime.characters.character import Character, Material, Surface
 from solvers.skeleton.tree import Tree
 
 BONE = 0.06  # [m], about
@@ -108,6 +110,28 @@ def capsule_body(branches: Branches) -> CapsuleBody:
         count += len(points)
     tree = Tree(np.array(parents), np.array(places))
     return CapsuleBody(np.concatenate(vertices), np.concatenate(faces), tree, tuple(owners))
+
+
+def character_of(body: CapsuleBody) -> Character:
+    """The body as a character without a plan."""
+    count = len(body.vertices)
+    names = tuple(f"node{index}" for index in range(len(body.tree)))
+    return Character(
+        name="capsules",
+        vertices=body.vertices,
+        faces=body.faces,
+        skeleton=Skeleton(names, body.tree.parents, body.tree.positions),
+        weights=None,
+        surface=Surface(
+            vertex=np.arange(count),
+            faces=body.faces.astype(np.int32),
+            colors=np.ones((count, 4), np.float32),
+            uvs=None,
+            materials=(Material(np.ones(4, np.float32)),),
+            face_material=np.zeros(len(body.faces), dtype=np.int64),
+        ),
+        file_to_stage=np.eye(4),
+    )
 
 
 def _evenly(corners: Array) -> Array:

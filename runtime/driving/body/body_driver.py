@@ -12,10 +12,12 @@ from devices.bodies.body_plan import SIDES
 from devices.bodies.plan_by_names import plan_by_names
 from devices.bodies.rest_heading import rest_heading
 from devices.errors import InputError
+from runtime.driving.body.bearing import Bearing, low_bearing, room_below
 from runtime.driving.body.body_parts import TwoBodies, body_parts
 from runtime.driving.body.footing import Footing, FootingState
 from runtime.driving.body.joint_turns import JointTurns
 from runtime.driving.body.long_arms import LongArms
+from runtime.driving.body.many_legs import ManyLegs
 from runtime.driving.body.path import Path
 from runtime.driving.body.rearing import Rearing
 from runtime.driving.body.upright import upright_at_rest, upright_in_poses
@@ -97,7 +99,15 @@ class BodyDriver:
         self._joint_turns = JointTurns(
             bodies.performer, (*parts.hands, parts.skull), heading_at_rest, bodies.facing
         )
+        vertices, owner = pairing.surface.rest, skeleton.skin.nodes[:, 0]
         self._ratio = self._size_ratio(bodies.upright)
+        self._bearing: Bearing | None = None
+        self._many_legs: ManyLegs | None = None
+        if parts.steps:
+            room, half = room_below(bodies, vertices, owner)
+            self._bearing = low_bearing(room, half)
+            self._many_legs = ManyLegs(bodies, parts.steps, room)
+            self._ratio = self._many_legs.ratio
         # Who sits before a camera, or lends one arm only, does not move the whole.
         self._goes_along = len(parts.legs) == len(SIDES)
         self._sinking = 1.0
@@ -110,7 +120,6 @@ class BodyDriver:
             ours = float(np.linalg.norm(np.diff(bodies.tree.positions[self._hips], axis=0)))
             self._sinking = min(self._ratio * theirs / max(ours, 1e-9), 1.0)
         self._left = np.array([np.cos(bodies.facing), 0.0, -np.sin(bodies.facing)])
-        vertices, owner = pairing.surface.rest, skeleton.skin.nodes[:, 0]
         self._footing = Footing(bodies, parts, vertices, owner)
         self._ends = _ends(bodies)
         self._rearing = Rearing(bodies)
@@ -167,17 +176,23 @@ class BodyDriver:
         self._footing.watch(pose)
         left = rotate(self._trunk[0], self._left)
         trunk = self._rearing.reared(self._trunk, joints, left)
+        if self._bearing is not None:
+            trunk = self._bearing.of(trunk)
         self._footing.turn_soles(joints, left, pose.time, given)
         pose_limbs(rig, joints, trunk, given, self._twists, rotations, positions)
+        if self._many_legs is not None:
+            self._many_legs.step(joints, positions, rotations, given)
+            pose_limbs(rig, joints, trunk, given, self._twists, rotations, positions)
         across = rotate(trunk[1], self._left)
         above = self._ratio * self._footing.above
         if self._long_arms.raise_arms(positions, rotations, given, across, above):
             pose_limbs(rig, joints, trunk, given, self._twists, rotations, positions)
         path = self._path(pose, rest, heading, positions)
-        if self._goes_along:
+        plants = self._many_legs is None  # many feet stay where they stand as it is
+        if self._goes_along and plants:
             shift = self._footing.hip_shift(pose, positions, path.performer_on_stage, path.on_stage)
             path = replace(path, shift=shift)
-        if self._footing.plant(
+        if plants and self._footing.plant(
             pose,
             (positions, rotations),
             left,

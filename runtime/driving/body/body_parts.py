@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +54,25 @@ class Arm:
     starts: tuple[int, ...]
 
 
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A leg of a body of many legs: its foot goes where a foot of the performer goes.
+
+    Attributes:
+        side: of the body.
+        target: hip, knee and foot of the character.
+        segments: numbers of the upper and the lower segment.
+        in_turn: whether it steps when the performer's leg of the other side does.
+        by_arm: whether it follows the performer's arm when this is lifted.
+    """
+
+    side: Side
+    target: tuple[int, int, int]
+    segments: tuple[int, int]
+    in_turn: bool
+    by_arm: bool
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class BodyParts:
     """The corresponding parts of a performer and a character, ready to be posed.
@@ -67,6 +86,7 @@ class BodyParts:
         skull: the performer's joint that turns the head; -1 for none.
         legs: the legs of both.
         arms: the arms that are driven absolutely.
+        steps: the legs of a body of many legs.
     """
 
     parts: tuple[DrivenPart, ...]
@@ -77,6 +97,7 @@ class BodyParts:
     skull: int
     legs: tuple[Leg, ...]
     arms: tuple[Arm, ...]
+    steps: tuple[Step, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -140,24 +161,8 @@ def body_parts(bodies: TwoBodies, least_upright: float) -> BodyParts | None:
     """
     source, plan = bodies.source, bodies.plan
     rig = RigBuilder(bodies.tree, bodies.upright, bodies.facing)
-    parts: list[DrivenPart] = []
-    legs: list[Leg] = []
-    arms: list[Arm] = []
-    drive = rig.drive_of(plan.legs.values(), least_upright)
-    for _, theirs, ours in bodies.pairs(source.legs, plan.legs):
-        segments = rig.add_leg(theirs, ours, drive)
-        parts.append(bodies.part(theirs.chain, ours.chain, drive))
-        if theirs.lower and ours.lower:
-            legs.append(Leg(_bends(theirs), _bends(ours), segments))
-    drive = rig.drive_of(plan.arms.values(), least_upright)
-    for side, theirs, ours in bodies.pairs(source.arms, plan.arms):
-        palms = _knuckles(source, side), _knuckles(plan, side)
-        numbers = rig.add_arm(theirs, ours, *palms, drive)
-        parts.append(bodies.part(theirs.chain, ours.chain, drive))
-        if drive == ABSOLUTE:
-            starts = tuple(chain[0] for chain in ours.segments[: len(numbers)])
-            arms.append(Arm(ours.chain, numbers, starts))
-        rig.add_fingers(source, plan, side)
+    limbs = _stepping(bodies, rig) if plan.more_legs else _pointing(bodies, rig, least_upright)
+    parts = limbs.parts
     if not parts and not bodies.head_drives:
         return None
     if len(plan.trunk) > 1 and bodies.trunk_drives:
@@ -169,13 +174,64 @@ def body_parts(bodies: TwoBodies, least_upright: float) -> BodyParts | None:
     return BodyParts(
         tuple(parts),
         rig.finished(),
-        _trunk_joints(bodies, both_legs=len(legs) == len(SIDES)),
+        _trunk_joints(bodies, both_legs=len(limbs.legs) == len(SIDES)),
         np.array(rig.hands, dtype=np.int64),
         np.array(rig.hand_change).reshape(-1, 4),
         skull,
-        tuple(legs),
-        tuple(arms),
+        tuple(limbs.legs),
+        tuple(limbs.arms),
+        tuple(limbs.steps),
     )
+
+
+@dataclass(frozen=True, slots=True)
+class _Limbs:
+    """The limbs that follow, and what they are called: see `BodyParts`."""
+
+    parts: list[DrivenPart] = field(default_factory=list)
+    legs: list[Leg] = field(default_factory=list)
+    arms: list[Arm] = field(default_factory=list)
+    steps: list[Step] = field(default_factory=list)
+
+
+def _pointing(bodies: TwoBodies, rig: RigBuilder, least_upright: float) -> _Limbs:
+    """Let legs follow legs and arms follow arms, bone for bone."""
+    source, plan, limbs = bodies.source, bodies.plan, _Limbs()
+    drive = rig.drive_of(plan.legs.values(), least_upright)
+    for _, theirs, ours in bodies.pairs(source.legs, plan.legs):
+        segments = rig.add_leg(theirs, ours, drive)
+        limbs.parts.append(bodies.part(theirs.chain, ours.chain, drive))
+        if theirs.lower and ours.lower:
+            limbs.legs.append(Leg(_bends(theirs), _bends(ours), segments))
+    drive = rig.drive_of(plan.arms.values(), least_upright)
+    for side, theirs, ours in bodies.pairs(source.arms, plan.arms):
+        palms = _knuckles(source, side), _knuckles(plan, side)
+        numbers = rig.add_arm(theirs, ours, *palms, drive)
+        limbs.parts.append(bodies.part(theirs.chain, ours.chain, drive))
+        if drive == ABSOLUTE:
+            starts = tuple(chain[0] for chain in ours.segments[: len(numbers)])
+            limbs.arms.append(Arm(ours.chain, numbers, starts))
+        rig.add_fingers(source, plan, side)
+    return limbs
+
+
+def _stepping(bodies: TwoBodies, rig: RigBuilder) -> _Limbs:
+    """Let the feet of many legs go where the performer's feet, and hands, go."""
+    source, plan, limbs = bodies.source, bodies.plan, _Limbs()
+    pairs = (plan.legs, *reversed(plan.more_legs), plan.arms)
+    for number, pair in enumerate(pairs):
+        by_arm = pair is plan.arms
+        theirs = source.arms if by_arm else source.legs
+        for side, limb, ours in bodies.pairs(theirs, pair):
+            if not ours.lower:
+                continue
+            segments = rig.add_step(limb, ours)
+            limbs.parts.append(bodies.part(limb.chain, ours.chain, RELATIVE))
+            target = ours.upper[0], ours.lower[0], ours.lower[-1]
+            limbs.steps.append(Step(side, target, segments, number % 2 == 1, by_arm))
+            if pair is plan.legs and limb.lower:
+                limbs.legs.append(Leg(_bends(limb), _bends(ours), (*segments, -1)))
+    return limbs
 
 
 def _trunk_joints(bodies: TwoBodies, *, both_legs: bool) -> TrunkJoints:

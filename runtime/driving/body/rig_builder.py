@@ -77,6 +77,11 @@ class RigBuilder:
             self._along[foot] = _direction(self._upright, ends)
         return last - 1, last, foot
 
+    def add_step(self, theirs: Limb, ours: Limb) -> tuple[int, int]:
+        """Let both segments of a leg of many be turned by its step; return their numbers."""
+        near, far = theirs.upper[0], (theirs.lower or theirs.upper)[-1]
+        return self._add(ours.upper, near, far), self._add(ours.lower, near, far)
+
     def add_arm(
         self,
         theirs: Limb,
