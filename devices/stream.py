@@ -21,7 +21,7 @@ class SkeletonStream(Protocol):
 
     @property
     def ended(self) -> bool:
-        """True once no further frame can come; a live source never ends by itself."""
+        """True once no further frame can come; of live sources only a film ends by itself."""
         ...
 
     def poll(self) -> Sequence[SkeletonFrame]:
@@ -48,6 +48,7 @@ ADAPTERS = {
     "leap": "devices.leap.sdk",
     "leap+ws": "devices.leap.websocket",
     "mediapipe": "devices.mediapipe.stream",
+    "webcam": "devices.webcam.stream",
     "zmq+tcp": "devices.bridge.stream",
 }
 """The module of each address scheme. Each module has `open_device(address: SplitResult)`. It is

@@ -37,6 +37,7 @@ EXTRAS = {
     "cv2",
     "cyndilib",
     "fast_simplification",
+    "flatbuffers",
     "igl",
     "imgui_bundle",
     "manifold3d",

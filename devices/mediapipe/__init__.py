@@ -1,1 +1,1 @@
-"""MediaPipe landmarks, from a webcam or another program: `mediapipe://`."""
+"""MediaPipe landmarks from another program: `mediapipe://`."""

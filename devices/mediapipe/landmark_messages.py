@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -45,6 +45,14 @@ _HANDS = {f"{side}_{name}" for side in SIDES for name in HAND_LANDMARKS[1:]}
 _POSE_ROW = {name: row for row, name in enumerate(POSE_LANDMARKS)}
 
 
+class Clock(Protocol):
+    """Maps a sender's times to the host's monotonic clock."""
+
+    def host_time(self, device: float, arrival: float) -> float:
+        """Return the host time [s] of a sender's time [s] that was received at `arrival` [s]."""
+        ...
+
+
 class LandmarkDecoder:
     """Frames of all people in a message.
 
@@ -52,17 +60,20 @@ class LandmarkDecoder:
         hands: whether the skeleton has MediaPipe's hands, 21 points each, instead of the three
             fingertips of its pose.
         view: horizontal field of view of the camera [degrees].
+        clock: maps the sender's times to the host's; by the smallest recent delay if None.
 
     Attributes:
         refused: messages, or people in them, that could not be decoded.
     """
 
-    def __init__(self, *, hands: bool = False, view: float = USUAL_VIEW) -> None:
+    def __init__(
+        self, *, hands: bool = False, view: float = USUAL_VIEW, clock: Clock | None = None
+    ) -> None:
         self.refused = 0
         self._skeleton = landmark_skeleton(set(PARENTS) - (_FINGERTIPS if hands else _HANDS))
         self._columns = {name: column for column, name in enumerate(self._skeleton.names)}
         self._focal = 0.5 / math.tan(math.radians(0.5 * view))  # in widths of the image
-        self._clock = ClockMap()
+        self._clock: Clock = clock or ClockMap()
         self._numbers = PerformerNumbers()
         self._origin: Array | None = None
         self._places: dict[int, Array] = {}

@@ -9,7 +9,6 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from enum import StrEnum
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 from urllib.parse import SplitResult, urlsplit
@@ -33,7 +32,7 @@ PLACES = (
     "rokoko://127.0.0.1:14043",
     "xsens://127.0.0.1:9763",
     "mediapipe://127.0.0.1:7005",
-    "mediapipe://webcam",
+    "webcam://0",
     "kinect://v1",
     "kinect://v2",
     "kinect://azure",
@@ -120,7 +119,7 @@ def _watch(
 ) -> Watch:
     seen = Watch(address)
     try:
-        stream = open_stream(_with_wait(urlsplit(address), seconds))
+        stream = open_stream(_for_a_look(urlsplit(address), seconds))
     except InputError as error:
         return _not_opened(seen, str(error))
     with stream:
@@ -137,11 +136,16 @@ def _watch(
     return _described(seen, time.perf_counter(), seconds)
 
 
-def _with_wait(address: SplitResult, seconds: float) -> str:
-    """The address; for a bridge with the time to wait for it, unless the address has one."""
-    if address.scheme == "zmq+tcp" and "wait=" not in address.query:
-        return f"{address.geturl()}{'&' if address.query else '?'}wait={seconds}"
-    return address.geturl()
+def _for_a_look(address: SplitResult, seconds: float) -> str:
+    """The address, with an option that keeps opening short, unless the address has it.
+
+    A bridge is waited for while others are listened to; a webcam fetches no models.
+    """
+    options = {"zmq+tcp": f"wait={seconds}", "webcam": "fetch=off"}
+    option = options.get(address.scheme)
+    if option is None or f"{option.partition('=')[0]}=" in address.query:
+        return address.geturl()
+    return f"{address.geturl()}{'&' if address.query else '?'}{option}"
 
 
 def _poll(seen: Watch, stream: SkeletonStream) -> None:
@@ -159,8 +163,6 @@ def _not_opened(seen: Watch, reason: str) -> Watch:
     if address.scheme in LISTENS and port and f"{port} is taken" in reason:
         seen.state = State.TAKEN
         seen.owner = port_owner(port, "tcp" if "transport=tcp" in address.query else "udp")
-    elif address.netloc == "webcam" and find_spec("mediapipe") is None:
-        seen.detail = "a webcam needs the extra: pip install 'bunraku[mediapipe]'"
     elif address.scheme == "zmq+tcp" and "no bridge answers" in reason:
         seen.state = State.SILENT
     return seen

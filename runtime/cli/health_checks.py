@@ -25,7 +25,7 @@ EXTRAS: dict[str, tuple[str, ...]] = {
     "video": ("av",),
     "usd": ("pxr",),
     "leap": ("websockets",),
-    "mediapipe": ("mediapipe", "cv2"),
+    "webcam": ("mediapipe", "cv2"),
     "camera": ("pyvirtualcam",),
     "ndi": ("cyndilib",),
     "bench": ("igl",),

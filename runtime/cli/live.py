@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import argparse
+from urllib.parse import urlsplit
 
 from runtime.cli.options.show_options import add_character_option, add_show_options
 
 HELP = "drive characters with a live performer"
+CAMERA = "webcam://"
+FILM = "webcam:///"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -24,4 +27,21 @@ def run(options: argparse.Namespace) -> int:
     from runtime.cli.performing import perform
 
     url: str = options.device
-    return perform(options, lambda: open_stream(url), origin=url)
+    if is_camera(url):
+        options.mirror = True if options.mirror is None else options.mirror
+    return perform(
+        options, lambda: open_stream(for_performers(url, options.performers)), origin=url
+    )
+
+
+def is_camera(url: str) -> bool:
+    """Whether performers stand before a webcam, and so look at a show as into a mirror."""
+    return url.startswith(CAMERA) and not url.startswith(FILM)
+
+
+def for_performers(url: str, count: int) -> str:
+    """A webcam's or film's address with the number of performers, unless it has one."""
+    address = urlsplit(url)
+    if address.scheme != "webcam" or count == 1 or "people=" in address.query:
+        return url
+    return f"{url}{'&' if address.query else '?'}people={count}"

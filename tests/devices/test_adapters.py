@@ -22,11 +22,12 @@ ADDRESSES = {
     "kinect": "kinect://v2",
     "leap": "leap://",
     "leap+ws": "leap+ws://127.0.0.1:1",
+    "webcam": "webcam://0?fetch=off",
     "zmq+tcp": "zmq+tcp://127.0.0.1:1?wait=0.05",
 }
 """Where each can be opened on a machine without sensors; port 0 is any free one."""
 
-NEEDS_A_DEVICE = {"kinect", "leap", "zmq+tcp"}
+NEEDS_A_DEVICE = {"kinect", "leap", "webcam", "zmq+tcp"}
 """Those that may find nothing at their address; they then say so in one line."""
 
 

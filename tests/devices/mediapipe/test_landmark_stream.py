@@ -1,4 +1,4 @@
-"""MediaPipe streams: landmarks from packets and from a webcam, and damaged ones."""
+"""MediaPipe streams: landmarks from packets, and damaged ones."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ from devices.bodies.camera_position import camera_position
 from devices.errors import InputError
 from devices.mediapipe.joints import HAND_LANDMARKS, POSE_LANDMARKS, SIDES
 from devices.mediapipe.landmark_messages import LandmarkDecoder
-from devices.mediapipe.webcam import Webcam, landmark_message
 from devices.skeleton import SkeletonFrame
 from devices.stream import open_stream
 from replay.formats import read_recording
@@ -271,32 +270,10 @@ def point(*numbers: float) -> SimpleNamespace:
     return SimpleNamespace(**dict(zip(("x", "y", "z", "visibility"), numbers, strict=True)))
 
 
-def test_what_mediapipe_returns_is_the_message_that_the_decoder_reads() -> None:
-    points, at = person(), np.array([0.0, 0.0, 2.5])
-    result = SimpleNamespace(
-        pose_world_landmarks=[[point(*map(float, p), 0.8) for p in points]],
-        pose_landmarks=[[point(*map(float, p), 0.8) for p in seen_at(points, at)]],
-    )
-    decoder = LandmarkDecoder()
-    (frame,) = decoder.feed(landmark_message(result, 40, (640, 480)), 0.0)
-    nose = points[POSE_LANDMARKS.index("nose")] * (1, -1, -1)
-    np.testing.assert_allclose(place(decoder, frame, "nose"), nose, atol=1e-9)
-    assert (
-        LandmarkDecoder().feed(
-            landmark_message(
-                SimpleNamespace(pose_world_landmarks=[], pose_landmarks=[]), 1, (2, 2)
-            ),
-            0.0,
-        )
-        == []
-    )
-
-
 @pytest.mark.parametrize(
     ("url", "says"),
     [
-        ("mediapipe://webcam", "model=FILE.task"),
-        ("mediapipe://webcam?model=a.task&camera=front", "camera's number"),
+        ("mediapipe://webcam?model=a.task", "a webcam is webcam://0"),
         ("mediapipe://127.0.0.1:7005?view=300", "from 10 to 170"),
         ("mediapipe://127.0.0.1:7005?hands=two", "on or off"),
         ("mediapipe://127.0.0.1:7005?model=x", "'model' is unknown"),
@@ -306,12 +283,6 @@ def test_an_address_that_cannot_be_opened_is_one_clear_line(url: str, says: str)
     with pytest.raises(InputError, match=says) as caught:
         open_stream(url)
     assert "\n" not in str(caught.value)
-
-
-def test_a_webcam_without_the_extra_is_one_clear_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "cv2", None)
-    with pytest.raises(InputError, match=r"pip install 'bunraku\[mediapipe\]'"):
-        Webcam(Path("no.task"), 0)
 
 
 class _Camera:

@@ -1,0 +1,1 @@
+"""A webcam or a film, without a model file to look for: `webcam://`."""
