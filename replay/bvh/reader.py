@@ -144,7 +144,7 @@ def _canonical(
     person = stands_upright(skeleton, parts, positions, up) or stands_upright(
         skeleton, parts, skeleton.rest_positions[None], up
     )
-    posed = _median_pose(positions)
+    posed = _measured(skeleton.rest_positions, positions)
     height = body_height(skeleton, parts, posed) if person else None
     scale = stated.metres or _metres(height, float(np.ptp(posed, axis=0).max()), notes)
     turn = up_to_y(up)
@@ -193,13 +193,16 @@ def _axis_name(axis: Array) -> str:
     return f"{'-+'[int(axis.sum() > 0)]}{'XYZ'[int(np.argmax(np.abs(axis)))]}"
 
 
-def _median_pose(positions: Array) -> Array:
-    """A pose (J, 3) with the bones' usual lengths, wherever a file states them.
+def _measured(rest: Array, positions: Array) -> Array:
+    """A pose (J, 3) with the bones' lengths: the zero pose, or one of the motion.
 
     The offsets of some files are zero, and all positions stand in channels.
     """
     whole = positions[np.isfinite(positions).all(axis=(1, 2))]
-    return whole[len(whole) // 2] if len(whole) else np.nan_to_num(np.nanmedian(positions, axis=0))
+    if not len(whole):
+        return rest
+    posed: Array = whole[len(whole) // 2]
+    return rest if np.ptp(rest, axis=0).max() > 0.1 * np.ptp(posed, axis=0).max() else posed
 
 
 def _metres(height: float | None, size: float, notes: list[str]) -> float:
