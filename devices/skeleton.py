@@ -12,6 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from devices.errors import InputError
 from solvers.skeleton.tree import Tree, parents_first
 
+FARTHEST = 1e6  # [m] from the origin of a place that is believed
+MOST_SECONDS = 1e11  # [s] of a time that is believed: 3000 years; beyond, no milliseconds are left
+
 
 def _frozen(
     values: ArrayLike, dtype: type, shape: tuple[int, ...], name: str

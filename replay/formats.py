@@ -6,7 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+
 from devices.errors import InputError
+from replay.bounds import check_recordable, plausible
 from replay.bvh.reader import read_bvh, recognises_bvh
 from replay.foreign import conversion_hint
 from replay.joint_table import read_joint_table, recognises_joint_table
@@ -49,13 +52,19 @@ class RecordingFormat:
     recognises: Callable[[Path, bytes], bool]
     reader: Callable[[Path, Stated], Recording]
 
+    @np.errstate(all="ignore")  # numbers of a damaged file
     def read(self, path: Path, stated: Stated = UNSTATED) -> Recording:
         """Read the file at `path`; what is stated of it comes before what is guessed.
 
         Raises:
-            InputError: the file is damaged, or it leaves nothing open that is stated.
+            InputError: it is not a file, is damaged, or leaves nothing open that is stated.
         """
-        return stated.applied(self.reader(path, stated))
+        check_recordable(path)
+        recording = self.reader(path, stated)
+        try:
+            return stated.applied(plausible(recording))
+        except InputError as error:
+            raise InputError(f"{path}: {error}") from None
 
 
 def _certain(read: Callable[[Path], Recording]) -> Callable[[Path, Stated], Recording]:
@@ -109,6 +118,7 @@ def recognise(path: Path) -> RecordingFormat:
     Raises:
         InputError: the file does not exist, cannot be read, or has an unknown format.
     """
+    check_recordable(path)
     try:
         with path.open("rb") as file:
             head = _as_utf_8(file.read(HEAD_BYTES))
@@ -117,6 +127,8 @@ def recognise(path: Path) -> RecordingFormat:
                 head = _as_utf_8(file.read(JSON_HEAD_BYTES))
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror or error}") from error
+    except ValueError:
+        raise InputError(f"cannot read {str(path)!r}: no file can have this name") from None
     if not head:
         raise InputError(f"{path} is empty; record or copy it again")
     for candidate in formats():

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.blend_shapes import Blends
+from devices.printable import printable
 from replay.recording import Recording
 
 GAP_FACTOR = 3.0  # a step of more than this many medians is a gap
@@ -41,12 +42,15 @@ def summary(recording: Recording, path: Path, kind: str) -> list[str]:
     Rate, jitter and gaps refer to each performer's own frames. Jitter is the 95th percentile of the
     deviation of a step from the median step.
     """
-    names = recording.skeleton.names
+    names = [printable(name) for name in recording.skeleton.names]
     steps = performer_steps(recording)
     gaps = gaps_of(recording)
     lines = [
-        f"{path.name}: {kind}",
-        *(f"{_shown(name):<11} {_shown(text)}" for name, text in sorted(recording.source.items())),
+        f"{printable(path.name)}: {kind}",
+        *(
+            f"{printable(name, MOST_LETTERS):<11} {printable(text, MOST_LETTERS)}"
+            for name, text in sorted(recording.source.items())
+        ),
         f"frames      {len(recording)} in {recording.seconds:.3f} s",
         f"rate        {_rate(steps)}",
         f"gaps        {_gaps(gaps)}",
@@ -62,12 +66,7 @@ def summary(recording: Recording, path: Path, kind: str) -> list[str]:
         lines.append(f"blends      {_blends(recording.blends)}")
     if np.isfinite(recording.arrivals).any():
         lines.append(f"latency     {_latency(recording)}")
-    return lines + [f"note        {note}" for note in recording.notes]
-
-
-def _shown(text: str) -> str:
-    """The part of a text from a file that a terminal can show safely."""
-    return "".join(letter if letter.isprintable() else "?" for letter in text[:MOST_LETTERS])
+    return lines + [f"note        {printable(note)}" for note in recording.notes]
 
 
 def gaps_of(recording: Recording) -> list[Gap]:
@@ -166,7 +165,7 @@ def _missing(recording: Recording) -> str:
     worst = int(np.argmax(by_joint))
     return (
         f"{100 * missing.mean():.1f} % of joints; most often "
-        f"{recording.skeleton.names[worst]} ({100 * by_joint[worst]:.1f} %)"
+        f"{printable(recording.skeleton.names[worst])} ({100 * by_joint[worst]:.1f} %)"
     )
 
 
@@ -185,7 +184,7 @@ def _blends(blends: Sequence[Blends | None]) -> str:
     share = 100 * len(faces) / len(blends)
     return (
         f"{len(names)} blend shapes in {share:.0f} % of frames, {moving} of them move: "
-        f"{_shown(', '.join(names))}"
+        f"{printable(', '.join(names), MOST_LETTERS)}"
     )
 
 

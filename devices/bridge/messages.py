@@ -14,7 +14,6 @@ bit for bit. A joint that was not seen is NaN with confidence 0.
 from __future__ import annotations
 
 import json
-import math
 import struct
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -23,9 +22,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.blend_shapes import Blends, checked_blends
+from devices.bounded_json import parse_json
 from devices.bridge.sanitize import make_safe
 from devices.errors import InputError
-from devices.skeleton import Skeleton, SkeletonFrame
+from devices.skeleton import FARTHEST, MOST_SECONDS, Skeleton, SkeletonFrame
 
 VERSION = 1
 MAX_JOINTS = 1024
@@ -43,7 +43,7 @@ _SAMPLE = struct.Struct("<QQdIHB")
 _FACE = struct.Struct("<QQ")
 _ROTATIONS = 1
 _FARTHEST_REST = 1000.0  # [m]
-_BAD = (ValueError, TypeError, KeyError, OverflowError, RecursionError, InputError)
+_BAD = (ValueError, TypeError, KeyError, OverflowError, InputError)
 
 
 @dataclass(frozen=True, slots=True)
@@ -216,7 +216,7 @@ def _decode_call(body: bytes) -> Call | None:
         return None
     call = Call(*_CALL.unpack(body))
     known = call.mode in (LATEST, LOSSLESS, LEAVING) and call.credit <= MAX_CREDIT
-    return call if known and math.isfinite(call.called_at) else None
+    return call if known and abs(call.called_at) <= MOST_SECONDS else None
 
 
 def _decode_answer(body: bytes) -> Answer | None:
@@ -224,14 +224,14 @@ def _decode_answer(body: bytes) -> Answer | None:
         return None
     answer = Answer(*_ANSWER.unpack(body))
     clocks = (answer.called_at, answer.heard_at, answer.answered_at)
-    return answer if all(map(math.isfinite, clocks)) else None
+    return answer if all(abs(clock) <= MOST_SECONDS for clock in clocks) else None
 
 
 def _decode_announcement(body: bytes) -> Announcement | None:
     if len(body) < _SESSION.size:
         return None
     try:
-        found = json.loads(body[_SESSION.size :])
+        found = parse_json(body[_SESSION.size :])
         names = found["names"]
         if not (len(names) <= MAX_JOINTS and all(isinstance(name, str) for name in names)):
             return None
@@ -251,10 +251,12 @@ def _decode_sample(body: bytes) -> Sample | None:
     session, sequence, time, performer, joints, content = _SAMPLE.unpack_from(body)
     columns = 8 if content == _ROTATIONS else 4
     sized = len(body) == _SAMPLE.size + 8 * columns * joints and 1 <= joints <= MAX_JOINTS
-    if not (sized and content in (0, _ROTATIONS) and math.isfinite(time)):
+    if not (sized and content in (0, _ROTATIONS) and abs(time) <= MOST_SECONDS):
         return None
     numbers = np.frombuffer(body, "<f8", offset=_SAMPLE.size).astype(np.float64)
     positions = numbers[: 3 * joints].reshape(joints, 3)
+    if (np.isfinite(positions) & (np.abs(positions) > FARTHEST)).any():
+        return None
     confidence = numbers[3 * joints : 4 * joints]
     rotations = numbers[4 * joints :].reshape(-1, 4)
     make_safe(positions, confidence, rotations)
@@ -267,7 +269,7 @@ def _decode_face(body: bytes) -> FaceWeights | None:
         return None
     session, sequence = _FACE.unpack_from(body)
     try:
-        found = json.loads(body[_FACE.size :])
+        found = parse_json(body[_FACE.size :])
     except _BAD:
         return None
     blends = checked_blends(found.items()) if isinstance(found, dict) else None

@@ -22,6 +22,7 @@ from devices.leap.tips import Tip
 Array = NDArray[np.float64]
 
 FARTHEST_MM = 1e5
+MOST_HANDS, MOST_POINTABLES = 64, 512  # of one message
 _PLACES = {"elbow": "elbow", "wrist": "wrist", PALM: "palmPosition"}
 # The bone that starts at a joint, of the four of a finger: metacarpal, proximal, intermediate,
 # distal. No bone starts at the tip, which keeps the rotation of the last one.
@@ -77,8 +78,8 @@ class LeapFrame:
 
 def leap_frame(message: Mapping[str, Any]) -> LeapFrame:
     """Return the frame in a decoded message; hands without a palm are omitted."""
-    found = {hand.id: hand for hand in map(_found, _objects(message.get("hands")))}
-    for pointable in _objects(message.get("pointables")):
+    found = {hand.id: hand for hand in map(_found, _objects(message.get("hands"), MOST_HANDS))}
+    for pointable in _objects(message.get("pointables"), MOST_POINTABLES):
         of = found.get(_whole(pointable.get("handId")))
         if of is not None and pointable.get("tool") is not True:
             _add_finger(of, pointable)
@@ -192,8 +193,10 @@ def _bases(axes: Mapping[str, Any], palm: Array) -> dict[str, Array]:
     return {name: turned[row] for row, name in enumerate(names) if known[row]}
 
 
-def _objects(found: Any) -> list[dict[str, Any]]:
-    return [item for item in found if isinstance(item, dict)] if isinstance(found, list) else []
+def _objects(found: Any, most: int) -> list[dict[str, Any]]:
+    """The objects among the first ones of a list; none of anything else."""
+    items = found[:most] if isinstance(found, list) else []
+    return [item for item in items if isinstance(item, dict)]
 
 
 def _vector(value: Any) -> tuple[float, float, float] | None:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
+from devices.skeleton import MOST_SECONDS
+
 WINDOW = 2.0  # [s] of arrivals over which a minimum is taken
 FARTHEST = 0.5  # [s] largest plausible delay between mapped time and arrival
-LARGEST = 1e11  # [s] of a device clock: 3000 years; a larger float64 resolves no milliseconds
 STEP_BACK = 0.25  # [s] larger than the delay of any packet on a local network
 
 
@@ -36,7 +37,7 @@ class ClockMap:
         It is never later than the arrival, and never earlier than the previous result while
         arrivals do not fall. A device time that is not finite or too large yields the arrival.
         """
-        if not abs(device) < LARGEST:  # also for NaN
+        if not abs(device) < MOST_SECONDS:  # also for NaN
             self._last_host = max(self._last_host, arrival)
             return arrival
         offset = arrival - device

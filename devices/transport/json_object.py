@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from typing import Any
+
+from devices.bounded_json import parse_json
 
 
 def json_object(data: bytes, most_bytes: int) -> dict[str, Any]:
@@ -11,7 +12,7 @@ def json_object(data: bytes, most_bytes: int) -> dict[str, Any]:
     if len(data) > most_bytes:
         return {}
     try:
-        message = json.loads(data)
-    except (ValueError, RecursionError):
+        message = parse_json(data)
+    except ValueError:
         return {}
     return message if isinstance(message, dict) else {}

@@ -10,7 +10,7 @@ Source: Meredith and Maddock 2001, "Motion Capture File Formats Explained", sect
 from __future__ import annotations
 
 import re
-import warnings
+from array import array
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NoReturn
@@ -22,11 +22,13 @@ from devices.errors import InputError
 from replay.text_file import file_text
 
 MOST_JOINTS = 10_000
+MOST_LINES = 10_000_000
 MOST_POSES = 20_000_000  # frames times joints
 _LARGEST = 1e7  # largest plausible length or angle
 _USUAL_FRAME_TIME = 1 / 30
 _USUAL_RATES = (10, 12, 15, 20, 24, 25, 30, 48, 50, 60, 72, 75, 90, 100, 120, 144, 200, 240, 250)
 _SLOWEST = 1.5  # [s] a frame; a greater frame time has another unit
+_LINES_AT_ONCE = 4096
 _CHANNEL = re.compile(r"([XYZ])(position|rotation|scale)$", re.IGNORECASE)
 _MOTION = re.compile(r"\}\s*MOTION\b", re.IGNORECASE)
 _TIMING = re.compile(
@@ -80,6 +82,8 @@ def read_bvh_text(path: Path) -> BvhText:
         InputError: the file is unreadable, too large or not BVH; with the line where known.
     """
     text = file_text(path)
+    if (lines := text.count("\n")) > MOST_LINES:
+        raise InputError(f"{path}: {lines} lines are too many; remove the empty ones")
     if "#" in text or "//" in text:
         text = _COMMENT.sub("", text)
     motion = _MOTION.search(text)
@@ -265,12 +269,16 @@ def _whole_frames(path: Path, counts: list[int], columns: int, first_line: int) 
 
 def _numbers(text: str) -> NDArray[np.float64] | None:
     """All numbers of `text`, or None if it contains anything else."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        try:
-            return np.fromstring(text, dtype=np.float64, sep=" ") if text.strip() else np.zeros(0)
-        except (DeprecationWarning, ValueError):
-            return None
+    if "_" in text:  # float() reads 1_000
+        return None
+    numbers = array("d")
+    lines = text.split("\n")
+    try:
+        for first in range(0, len(lines), _LINES_AT_ONCE):
+            numbers.extend(map(float, " ".join(lines[first : first + _LINES_AT_ONCE]).split()))
+    except ValueError:
+        return None
+    return np.frombuffer(numbers).copy() if numbers else np.zeros(0)
 
 
 def _frame_time(word: str, notes: list[str]) -> float:

@@ -40,7 +40,7 @@ def read_azure_csv(path: Path) -> Recording:
     frames = []
     for at, line in lines[1:]:
         try:
-            frames.append(_joints(line.split(","), columns))
+            frames.append(np.array(_joints(line.split(","), columns)))
         except (ValueError, IndexError) as error:
             if frames and at == lines[-1][0]:
                 notes.append("the last line is truncated and was omitted")

@@ -6,7 +6,6 @@ the depth camera's space, Y down; quaternions (w, x, y, z); times [us].
 
 from __future__ import annotations
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -15,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from devices.bounded_json import parse_json
 from devices.errors import InputError
 from devices.kinect.joints import AZURE_TO_WORLD, KINECT_AZURE
 from replay.kinect.camera_recording import KINECT_RATE, camera_recording, rising
@@ -42,7 +42,7 @@ def read_azure_json(path: Path) -> Recording:
         InputError: the file is not such JSON, is cut off, or holds no body.
     """
     try:
-        document = json.loads(file_text(path))
+        document = parse_json(file_text(path))
         frames = document["frames"]
         order = _order(document.get("joint_names"))
         bodies = [

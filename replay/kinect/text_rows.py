@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +13,7 @@ from devices.errors import InputError
 Array = NDArray[np.float64]
 
 MOST_BYTES = 128 * 2**20
+MOST_LINES = 6_000_000
 
 
 def read_lines(path: Path) -> list[str]:
@@ -26,6 +28,8 @@ def read_lines(path: Path) -> list[str]:
         raw = path.read_bytes()
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror or error}") from error
+    if raw.count(b"\n") > MOST_LINES:
+        raise InputError(f"{path}: more than {MOST_LINES} lines; split the recording")
     try:
         return raw.decode("utf-8-sig").splitlines()
     except UnicodeDecodeError as error:
@@ -57,16 +61,18 @@ def number_rows(
     Raises:
         InputError: a line has another number of fields or other text, or there is no line.
     """
-    rows: list[list[float]] = []
-    filled = [(at, line) for at, line in enumerate(lines, 1) if line.strip()]
-    for place, (at, line) in enumerate(filled):
+    numbers = array("d")
+    last = next((at for at in range(len(lines), 0, -1) if lines[at - 1].strip()), 0)
+    for at, line in enumerate(lines[:last], 1):
+        if not line.strip():
+            continue
         fields = line.strip().rstrip(separator).split(separator)
         if len(fields) == columns and are_numbers(fields):
-            rows.append([float(field) for field in fields])
-        elif rows and place == len(filled) - 1:
+            numbers.extend(map(float, fields))
+        elif numbers and at == last:
             notes.append("the last line is truncated and was omitted")
         else:
             raise InputError(f"{path}, line {at}: expected {columns} numbers, got {line[:60]!r}")
-    if not rows:
+    if not numbers:
         raise InputError(f"{path}: holds no frame")
-    return np.array(rows)
+    return np.frombuffer(numbers).reshape(-1, columns).copy()

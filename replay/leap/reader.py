@@ -12,7 +12,6 @@ kept, also at the ends of a recording, with every joint NaN and confidence 0.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
 from pathlib import Path
@@ -21,6 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from devices.bounded_json import parse_json
 from devices.errors import InputError
 from devices.leap.hands import Hand, LeapFrame, leap_frame
 from devices.leap.joints import (
@@ -33,13 +33,14 @@ from devices.leap.joints import (
 )
 from devices.leap.tips import name_tips
 from devices.skeleton import Skeleton
+from replay.bounds import check_poses
 from replay.leap.lz_string import lz_pieces
 from replay.recording import Recording
 
 Array = NDArray[np.float64]
 
 MAX_BYTES = 128 << 20  # of a JSON document, decompressed
-MAX_LINE = 4 << 20
+MAX_LINE = 1 << 20
 MAX_FRAMES = 1_000_000
 USUAL_RATE = 110.0  # frames/s if the file does not state a rate
 
@@ -66,7 +67,7 @@ def read_leap(path: Path) -> Recording:
         frames = [leap_frame(message) for message in _messages(path, notes)]
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror or error}") from error
-    except (ValueError, TypeError, KeyError, RecursionError) as error:
+    except (ValueError, TypeError, KeyError, OverflowError) as error:
         raise InputError(
             f"{path} is a damaged or truncated Leap recording: {_short(error)}"
         ) from error
@@ -76,7 +77,10 @@ def read_leap(path: Path) -> Recording:
     tracks = follow_hands(frames)
     if any(hand.tips for track in tracks.values() for hand in track if hand):
         notes += name_tips(tracks)
-    return _recording(tracks, times, tuple(notes))
+    try:
+        return _recording(tracks, times, tuple(notes))
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
 
 
 def _short(error: BaseException) -> str:
@@ -98,15 +102,15 @@ def _messages(path: Path, notes: list[str]) -> Iterator[dict[str, Any]]:
     if len(text) > MAX_BYTES:
         raise ValueError(f"it is larger than {MAX_BYTES >> 20} MiB")
     if text.lstrip()[:1] not in (b"{", b"["):
-        yield from _document_messages(json.loads(_decompress(text.strip())))
+        yield from _document_messages(parse_json(_decompress(text.strip())))
     else:
-        yield from _document_messages(json.loads(text))
+        yield from _document_messages(parse_json(text))
 
 
 def _is_one_line(line: bytes) -> bool:
     try:
-        return isinstance(json.loads(line), dict)
-    except (ValueError, RecursionError):
+        return isinstance(parse_json(line), dict)
+    except ValueError:
         return False
 
 
@@ -114,8 +118,8 @@ def _line_messages(file: Iterable[bytes], notes: list[str]) -> Iterator[dict[str
     bad = count = 0
     for line in file:
         try:
-            message = json.loads(line) if len(line) <= MAX_LINE else None
-        except (ValueError, RecursionError):
+            message = parse_json(line) if len(line) <= MAX_LINE else None
+        except ValueError:
             message = None
         if not isinstance(message, dict):
             bad += bool(line.strip())
@@ -247,6 +251,7 @@ def _recording(
     left = 2 * sum(hand.side == "left" for hand in hands) > len(hands)
     lengths = _lengths(hands, hand_skeleton(joints))
     skeleton = hand_skeleton(joints, sides, lengths, left=left)
+    check_poses(len(times), len(skeleton.names))
     positions = np.full((len(times), len(skeleton.names), 3), np.nan)
     confidence = np.zeros(positions.shape[:2])
     column = {name: index for index, name in enumerate(skeleton.names)}

@@ -25,8 +25,9 @@ import orjson
 from numpy.typing import NDArray
 
 from devices.blend_shapes import checked_blends
+from devices.bounded_json import parse_json
 from devices.errors import InputError
-from devices.skeleton import Skeleton, SkeletonFrame
+from devices.skeleton import MOST_SECONDS, Skeleton, SkeletonFrame
 from replay.mcap.record_reader import DamagedRecordError
 
 SKELETON_NAME = "bunraku.skeleton"
@@ -34,6 +35,7 @@ SOURCE_NAME = "bunraku.source"
 SKELETON_TOPIC = "/skeleton"
 PERFORMER_TOPIC = "/performer/"
 FARTHEST_REST = 1000.0  # [m]
+MOST_JOINTS = 10_000
 
 _NUMBER = {"type": ["number", "null"]}
 _ROWS = {"type": "array", "items": {"type": "array", "items": _NUMBER}}
@@ -59,7 +61,7 @@ FRAME_SCHEMA: dict[str, object] = {
         "blends": {"type": "object", "additionalProperties": {"type": "number"}},
     },
 }
-_BAD_JSON = (ValueError, TypeError, KeyError, OverflowError, RecursionError)
+_BAD_JSON = (ValueError, TypeError, KeyError, OverflowError)
 
 
 def encode_skeleton(skeleton: Skeleton) -> str:
@@ -80,8 +82,10 @@ def decode_skeleton(text: str | bytes) -> Skeleton:
         InputError: the JSON does not describe a skeleton.
     """
     try:
-        found = json.loads(text)
+        found = parse_json(text)
         names = tuple(str(name) for name in found["names"])
+        if len(names) > MOST_JOINTS:
+            raise InputError(f"its skeleton has more than {MOST_JOINTS} joints")
         rest = np.array(found["rest_positions"], dtype=np.float64)
         if not (np.abs(rest) <= FARTHEST_REST).all():
             raise InputError(f"a joint of its skeleton rests farther than {FARTHEST_REST:g} m away")
@@ -114,29 +118,29 @@ def decode_frame(data: bytes, joints: int) -> SkeletonFrame:
         DamagedRecordError: the JSON is not a frame of `joints` joints.
     """
     try:
-        found = json.loads(data)
+        found = parse_json(data)
         positions = _array(found["positions"], (joints, 3))
-        confidence = np.clip(np.nan_to_num(_array(found["confidence"], (joints,))), 0.0, 1.0)
-        confidence[~np.isfinite(positions).all(axis=1)] = 0.0
+        confidence = np.minimum(np.maximum(_array(found["confidence"], (joints,)), 0.0), 1.0)
+        confidence[np.isnan(confidence) | np.isnan(positions).any(axis=1)] = 0.0
         rotations = found.get("rotations")
         arrival, blends = found.get("arrival"), found.get("blends")
         return SkeletonFrame(
-            time=_finite_number(found["time"]),
+            time=_time(found["time"]),
             positions=positions,
             rotations=None if rotations is None else _array(rotations, (joints, 4)),
             confidence=confidence,
             performer=int(found.get("performer", 0)) % (1 << 31),
-            arrival=float("nan") if arrival is None else _finite_number(arrival),
+            arrival=float("nan") if arrival is None else _time(arrival),
             blends=checked_blends(blends.items()) if isinstance(blends, dict) else None,
         )
     except (*_BAD_JSON, AttributeError) as error:
         raise DamagedRecordError("a message is not a whole frame") from error
 
 
-def _finite_number(value: Any) -> float:
+def _time(value: Any) -> float:
     number = float(value)
-    if not np.isfinite(number):
-        raise ValueError(f"Expected a finite number, got {number}")
+    if not abs(number) <= MOST_SECONDS:  # also for NaN
+        raise ValueError(f"Expected a time, got {number}")
     return number
 
 

@@ -34,6 +34,11 @@ from replay.mcap.record_reader import (
 from replay.recording import Recording
 
 MOST_SOURCE_FACTS = 64
+FRAMES_OF_ANY = 100_000  # are read of any file, in some seconds
+SHORTEST_FRAME = 20  # [bytes] of each frame of a larger file; its index alone takes 16
+MOST_MEMORY = 1500 << 20  # [bytes] that the frames may take, or `MOST_TIMES` the file
+MOST_TIMES = 8
+_FRAME, _JOINT = 1024, 128  # [bytes] of a frame and each joint, while they are put together
 
 
 def recognises_mcap(path: Path, head: bytes) -> bool:
@@ -75,6 +80,11 @@ class McapReader:
         except InputError:
             self._file.close()
             raise
+
+    @property
+    def size(self) -> int:
+        """Of the file [bytes]."""
+        return self._size
 
     @property
     def indexed(self) -> bool:
@@ -180,12 +190,37 @@ def read_mcap(path: Path) -> Recording:
         InputError: the file cannot be read, is not a Bunraku recording, or holds no whole frame.
     """
     with McapReader(path) as reader:
-        frames = list(reader.frames())
+        frames = _bounded(reader)
         notes = _notes(reader, len(frames))
         skeleton, source = reader.skeleton, reader.source
     if not frames:
         raise InputError(f"{path} holds a skeleton but no whole frame")
     return stack_frames(skeleton, frames, notes, source)
+
+
+def most_frames(joints: int, size: int) -> int:
+    """How many frames are believed of a file: what its size makes likely and memory allows.
+
+    Compressed chunks can hold thousands of times their size.
+
+    Args:
+        joints: of each frame.
+        size: of the file [bytes].
+    """
+    memory = max(MOST_MEMORY, MOST_TIMES * size)
+    return min(max(FRAMES_OF_ANY, size // SHORTEST_FRAME), memory // (_FRAME + _JOINT * joints))
+
+
+def _bounded(reader: McapReader) -> list[SkeletonFrame]:
+    """All frames, of which there are no more than `most_frames`."""
+    most = most_frames(len(reader.skeleton.names), reader.size)
+    frames = list(islice(reader.frames(), most + 1))
+    if len(frames) > most:
+        raise InputError(
+            f"{reader.path}: it holds more than {most} frames, too many for its size; "
+            "split the recording"
+        )
+    return frames
 
 
 def stack_frames(

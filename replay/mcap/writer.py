@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Self
 
 from devices.errors import InputError
-from devices.skeleton import Skeleton, SkeletonFrame
+from devices.skeleton import MOST_SECONDS, Skeleton, SkeletonFrame
 from replay.mcap.frame_json import (
     FRAME_SCHEMA,
     PERFORMER_TOPIC,
@@ -89,12 +89,13 @@ class McapWriter:
                 frames; by default, when no frame is lost, the number of frames written before.
 
         Raises:
-            ValueError: the frame's joints are not the skeleton's, or its time is not finite.
+            ValueError: the frame's joints are not the skeleton's, or its time is beyond
+                `MOST_SECONDS`.
             InputError: the disk is full, or the file is gone.
         """
-        if len(frame.positions) != len(self.skeleton.names) or not math.isfinite(frame.time):
+        if len(frame.positions) != len(self.skeleton.names) or not abs(frame.time) <= MOST_SECONDS:
             raise ValueError(
-                f"Expected a frame of {len(self.skeleton.names)} joints at a finite time, "
+                f"Expected a frame of {len(self.skeleton.names)} joints at a time that is known, "
                 f"got {len(frame.positions)} at {frame.time}"
             )
         self._guard(lambda: self._append(frame, self.frames if sequence is None else sequence))
@@ -155,7 +156,7 @@ class McapWriter:
         _sync_folder(self.path)
 
     def _append(self, frame: SkeletonFrame, sequence: int) -> None:
-        arrival = frame.arrival if math.isfinite(frame.arrival) else frame.time
+        arrival = frame.arrival if abs(frame.arrival) <= MOST_SECONDS else frame.time
         log_time, publish_time = _nanoseconds(arrival), _nanoseconds(frame.time)
         if self.frames == 0:
             text = encode_skeleton(self.skeleton).encode()

@@ -8,12 +8,12 @@ per line. A frame is an object with "pose_world_landmarks", "poseLandmarks", "ke
 
 from __future__ import annotations
 
-import json
 import math
 import re
 from collections.abc import Iterator, Mapping
 from typing import Any
 
+from devices.bounded_json import check_json, parse_json
 from devices.mediapipe.joints import HAND_LANDMARKS, POSE_LANDMARKS, SIDES
 from replay.mediapipe.json_points import HOLISTIC, number_of, people_in, points_in
 from replay.mediapipe.moments import LandmarkText, Moment, Points, bounded
@@ -70,8 +70,9 @@ def read_document(text: str) -> LandmarkText:
         InputError: it has too many frames.
         ValueError, TypeError, KeyError, RecursionError: it is damaged.
     """
+    check_json(text)
     try:
-        document = json.loads(text)
+        document = parse_json(text)
     except ValueError:
         document = list(_json_lines(text))
     found = LandmarkText([])
@@ -85,7 +86,7 @@ def read_document(text: str) -> LandmarkText:
 def _json_lines(text: str) -> Iterator[Any]:
     for line in text.splitlines():
         try:
-            yield json.loads(line)
+            yield parse_json(line)
         except ValueError:
             continue  # a stopped recorder truncates its last line
 

@@ -25,6 +25,7 @@ from devices.mediapipe.joints import (
     landmarks_to_world,
 )
 from devices.skeleton import Skeleton
+from replay.bounds import check_poses
 from replay.mediapipe.landmarks import PersonLandmarks, Tracks, joints_in_metres, track
 from replay.mediapipe.pose_binary import PoseFile, has_pose_header, parse_pose
 from replay.mediapipe.text import has_landmark_text, parse_landmark_text
@@ -155,6 +156,7 @@ def _recording(people: Sequence[PersonLandmarks], notes: Sequence[str]) -> Recor
     if not any(joints):
         raise InputError("no body and no hand is seen in any frame")
     skeleton = landmark_skeleton({name for found in joints for name in found})
+    check_poses(sum(len(person.times) for person in people), len(skeleton.names))
     frames = [
         _frames(skeleton, person, found) for person, found in zip(people, joints, strict=True)
     ]

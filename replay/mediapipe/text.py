@@ -44,7 +44,7 @@ def parse_landmark_text(data: bytes, stated: Stated) -> tuple[list[PersonLandmar
     try:
         read = read_document if characters[:1] in _OPENING else read_table
         text = read(characters)
-    except (ValueError, TypeError, KeyError, RecursionError, csv.Error) as error:
+    except (ValueError, TypeError, KeyError, OverflowError, RecursionError, csv.Error) as error:
         raise InputError(f"its text is damaged ({type(error).__name__})") from error
     name_numbers(text)
     if not any(moment.people for moment in text.moments):

@@ -89,14 +89,15 @@ def _carry(stream: SkeletonStream, publisher: BridgePublisher, seconds: float) -
 
 def _make_keys(folder: Path) -> int:
     from devices.bridge.keys import PUBLISHER, SUBSCRIBER, make_keys
+    from devices.printable import printable
 
     make_keys(folder)
     print(
-        f"{folder / PUBLISHER}: for the machine of the device: "
+        f"{printable(str(folder / PUBLISHER))}: for the machine of the device: "
         f"bunraku bridge --keys {PUBLISHER} ..."
     )
     print(
-        f"{folder / SUBSCRIBER}: copy it to the machine of the show: "
+        f"{printable(str(folder / SUBSCRIBER))}: copy it to the machine of the show: "
         f"zmq+tcp://HOST:PORT?keys={SUBSCRIBER}"
     )
     return 0

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import io
-import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -12,6 +10,7 @@ from typing import Protocol, cast
 
 from devices.errors import InputError
 from runtime.show.interrupts import Interrupted, interruptible
+from runtime.show.messages import abandon, open_standard_streams, say
 
 COMMANDS = (
     "demo",
@@ -83,9 +82,7 @@ def parser() -> argparse.ArgumentParser:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the exit code is 0, 2 for bad input, 130 after Ctrl-C."""
-    for stream in (sys.stdout, sys.stderr):  # a name may hold what the terminal cannot show
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")
+    open_standard_streams()
     try:
         with interruptible():
             options = parser().parse_args(arguments)
@@ -97,9 +94,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except Interrupted as interrupted:
         return interrupted.code
     except BrokenPipeError:  # the reader of our output closed it
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        abandon(sys.stdout)
         return 0
     except OSError as error:
+        abandon(sys.stdout)  # what it still holds may be what does not fit
         where = f"{error.filename}: " if error.filename else ""
         return _refuse(f"{where}{error.strerror or error}; check the file and its disk")
     except MemoryError:
@@ -107,5 +105,5 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _refuse(reason: str) -> int:
-    print(f"bunraku: error: {' '.join(reason.split())}", file=sys.stderr)
+    say(f"error: {reason}")
     return BAD_INPUT

@@ -35,6 +35,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Write the recording again; print what was guessed and what was lost."""
+    from devices.printable import printable
     from runtime.cli.conversion import Conversion, convert
 
     conversion = Conversion(
@@ -47,5 +48,5 @@ def run(options: argparse.Namespace) -> int:
         stated=stated(options),
     )
     for line in convert(conversion):
-        print(line)
+        print(printable(line))
     return 0

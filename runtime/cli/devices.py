@@ -32,6 +32,7 @@ def run(options: argparse.Namespace) -> int:
     Raises:
         InputError: an address is of no known kind, or the file cannot be written.
     """
+    from devices.printable import printable
     from replay.formats import formats
     from runtime.characters.builtin import BUILTIN
     from runtime.cli.device_watch import PLACES, check_kind, watch, write_json
@@ -45,7 +46,7 @@ def run(options: argparse.Namespace) -> int:
     watches = watch(options.addresses or PLACES, seconds)
     width = max(len(seen.address) for seen in watches)
     for seen in watches:
-        print(f"{seen.state:<10} {seen.address:<{width}}  {seen.detail}")
+        print(f"{seen.state:<10} {printable(seen.address):<{width}}  {printable(seen.detail)}")
     if not options.addresses:
         print("recordings " + ", ".join(kind.name for kind in formats()))
         print("characters " + ", ".join(BUILTIN))

@@ -35,6 +35,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _of_character(name: str) -> list[str]:
+    from devices.printable import printable
     from runtime.characters.open_character import load_character
 
     character = load_character(name)
@@ -44,12 +45,12 @@ def _of_character(name: str) -> list[str]:
     parents = character.skeleton.parents
     leaves = set(range(len(parents))) - set(parents.tolist())
     return [
-        f"{name}: a character",
+        f"{printable(name)}: a character",
         f"vertices    {len(character.vertices)} ({len(character.surface.vertex)} in the file)",
         f"faces       {len(character.faces)}",
         f"nodes       {len(parents)}, {len(leaves)} of them leaves",
         f"rig         {'from the file' if character.weights is not None else 'none in the file'}",
         f"on stage    {width:.2f} x {height:.2f} x {depth:.2f} m",
-        f"blends      {', '.join(blends) or 'none'}",
-        *(f"note        {note}" for note in character.notes),
+        f"blends      {printable(', '.join(blends)) or 'none'}",
+        *(f"note        {printable(note)}" for note in character.notes),
     ]

@@ -39,6 +39,7 @@ def run(options: argparse.Namespace) -> int:
     """
     from devices.errors import InputError
     from devices.stream import open_stream
+    from replay.bounds import check_recordable
     from replay.recorded_stream import RecordedStream
     from replay.recorder import Recorder
     from runtime.output.files.whole_file import check_writable
@@ -46,6 +47,7 @@ def run(options: argparse.Namespace) -> int:
     from runtime.show.provenance import provenance
     from runtime.show.takes import set_aside
 
+    check_recordable(options.out)
     check_writable(options.out)
     warnings: list[str] = []
     with open_stream(options.device) as stream:

@@ -28,6 +28,7 @@ from runtime.characters.proxy import proxy_of
 from runtime.driving.performer import Performer
 from runtime.puppet.deformable_surface import Elasticity
 from runtime.render.normals import DeformingNormals, bounding_box, split_vertices
+from runtime.show.messages import say
 from runtime.show.open_stream import play
 from runtime.show.progress import Progress
 from runtime.show.settings import CharacterSettings, ShowSettings
@@ -53,7 +54,7 @@ def warm_up() -> None:
     """Compile every kernel that a show can reach and that is not in the cache."""
     if has_list(_SOLVERS, _NOT_SHOWN) and has_list(_SHOW, _NOT_SHOWN):
         return
-    print("bunraku: compiling kernels, once: a minute or two on two free cores", file=sys.stderr)
+    say("compiling kernels, once: a minute or two on two free cores")
     with _process_of_solvers() as solvers, _shown() as compiled:
         _use_decoders_and_surfaces()
         while solvers.poll() is None:

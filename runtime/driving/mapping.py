@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import itertools
-import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from devices.bounded_json import parse_json
 from devices.errors import InputError
 from devices.skeleton import Skeleton
 
@@ -58,11 +58,11 @@ def read_mapping(path: Path, source: Skeleton, target: Skeleton) -> Mapping:
             text = file.read(MAX_FILE + 1)
         if len(text) > MAX_FILE:
             raise InputError(f"{path} is too large for a mapping (over {MAX_FILE} bytes)")
-        pairs = _listed(json.loads(text), "pairs")
+        pairs = _listed(parse_json(text), "pairs")
         drives = tuple(_drive(pair, source, target) for pair in pairs)
     except OSError as error:
         raise InputError(f"cannot read the mapping {path}: {error.strerror or error}") from error
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+    except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
         raise InputError(
             f'{path} is not a mapping: expected {{"pairs": [{{"source": [joint names], '
             f'"target": [node ids]}}]}} ({type(error).__name__}: {error})'

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -14,6 +15,7 @@ from devices.errors import InputError
 
 INSTALL_HINT = "on Debian or Ubuntu: apt-get install libegl1 libgl1 libgl1-mesa-dri"
 _headless: WeakSet[moderngl.Context] = WeakSet()
+_QUIET = {"EGL_LOG_LEVEL": "fatal", "MESA_LOG": "null"}  # or Mesa writes to the terminal
 EGL_DEVICES = 4  # devices that are tried; GPUs come first and Mesa's software device last
 
 
@@ -29,6 +31,8 @@ def headless_context(*, libegl: str = "libEGL.so.1", libgl: str = "libGL.so.1") 
     """
     if not sys.platform.startswith("linux"):
         return _other_platform()
+    for name, value in _QUIET.items():
+        os.environ.setdefault(name, value)
     egl: dict[str, Any] = {"backend": "egl", "libegl": libegl, "libgl": libgl}
     refusals = []
     for device in range(EGL_DEVICES):

@@ -10,6 +10,7 @@ from pathlib import Path
 
 from devices.errors import InputError
 from devices.skeleton import Skeleton
+from replay.bounds import check_recordable
 from runtime.characters.character import Character
 from runtime.output.files.export import SUFFIXES, open_export
 from runtime.output.files.frames import Frames
@@ -49,6 +50,8 @@ def check_outputs(
     """
     written = list(_written(settings, characters))
     for option, path in written:
+        if option == "--record":
+            check_recordable(path)
         check_writable(path / "000000.png" if option == "--frames" and path.is_dir() else path)
     if settings.files.video is not None:
         encoder_for(settings.files.video)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from runtime.characters.formats.mesh_data import FileMesh, MeshError, check_counts
+from runtime.characters.formats.mesh_data import FileMesh, MeshError, check_counts, check_words
 from runtime.characters.formats.polygons import cut_polygons
 
 _CORNERS = {"triangles": 3, "quadrilaterals": 4, "tetrahedra": 4}
@@ -20,6 +20,7 @@ def read_medit(content: bytes) -> FileMesh:
     Raises:
         MeshError: a list is damaged, or there are no faces, or too many.
     """
+    check_words(content)
     lines = (line.split("#", 1)[0] for line in content.decode("latin-1").splitlines())
     words = " ".join(lines).split()
     if not words or words[0].lower() != "meshversionformatted":

@@ -11,6 +11,8 @@ from runtime.characters.character import Material
 
 MOST_VERTICES = 2_000_000
 MOST_FACES = 4_000_000
+MOST_WORDS = 14_000_000
+"""Words of a text that is split as a whole; each takes 60 bytes."""
 
 
 def plain_material() -> Material:
@@ -60,6 +62,16 @@ def check_counts(vertices: int, faces: int) -> None:
             f"it has {vertices} vertices and {faces} faces, more than {MOST_VERTICES} and "
             f"{MOST_FACES}; reduce it first"
         )
+
+
+def check_words(content: bytes) -> None:
+    """Refuse a text of more words than are read at once.
+
+    Raises:
+        MeshError: it has more than `MOST_WORDS`.
+    """
+    if sum(content.count(blank) for blank in (b" ", b"\n", b"\t", b"\r")) > MOST_WORDS:
+        raise MeshError(f"it has more than {MOST_WORDS} words; reduce it first")
 
 
 def check_indices(indices: NDArray[np.int64], vertices: int) -> None:

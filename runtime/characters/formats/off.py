@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from replay.text_file import without_mark
-from runtime.characters.formats.mesh_data import FileMesh, MeshError, check_counts
+from runtime.characters.formats.mesh_data import FileMesh, MeshError, check_counts, check_words
 from runtime.characters.formats.polygons import cut_polygons
 from runtime.characters.palette import linear_from_srgb
 
@@ -27,6 +27,7 @@ def read_off(content: bytes) -> FileMesh:
     Raises:
         MeshError: the file is damaged, cut short or binary.
     """
+    check_words(content)
     lines = [
         line.split()
         for raw in without_mark(content).decode("latin-1").splitlines()
@@ -103,7 +104,7 @@ def _numbers(rows: list[list[str]], width: int) -> NDArray[np.float64]:
     try:
         return np.array([row[:width] for row in rows], dtype=np.float64)
     except ValueError as error:
-        raise MeshError(f"a vertex is no number ({error}); it is damaged") from None
+        raise MeshError(f"a vertex is no number ({error!s:.80}); it is damaged") from None
 
 
 def _colors(values: NDArray[np.float64]) -> NDArray[np.float32]:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import re
+from array import array
 
 import numpy as np
 from numpy.typing import NDArray
 
 from replay.text_file import without_mark
-from runtime.characters.formats.mesh_data import FileMesh, MeshError, check_counts
+from runtime.characters.formats.mesh_data import MOST_FACES, FileMesh, MeshError, check_counts
 
 _FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])
 _VERTEX = re.compile(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", re.IGNORECASE)
@@ -50,12 +51,24 @@ def _binary(content: bytes) -> NDArray[np.float64]:
 
 
 def _ascii(content: bytes) -> NDArray[np.float64]:
-    found = _VERTEX.findall(content.replace(b",", b"."))  # decimal commas
+    content = content.replace(b",", b".")  # decimal commas
     if b"endsolid" not in content[-4096:].lower():
         raise MeshError("it has no endsolid: it is cut short; export it again")
-    if not found or len(found) % 3:
-        raise MeshError(f"it holds {len(found)} corners, which make no triangles; export it again")
+    numbers = array("d")
     try:
-        return np.array(found).astype(np.float64).reshape(-1, 3, 3)
-    except ValueError as error:
-        raise MeshError(f"a corner is no number ({error}); it is damaged") from None
+        for found in _VERTEX.finditer(content):
+            numbers.extend(map(float, found.groups()))
+            if len(numbers) > 9 * MOST_FACES:
+                raise MeshError(f"it has more than {MOST_FACES} faces; reduce it first")
+    except ValueError:
+        raise MeshError(f"a corner is no number ({_shown(found[0])}); it is damaged") from None
+    if not numbers or len(numbers) % 9:
+        raise MeshError(
+            f"it holds {len(numbers) // 3} corners, which make no triangles; export it again"
+        )
+    return np.frombuffer(numbers).reshape(-1, 3, 3)
+
+
+def _shown(text: bytes) -> str:
+    """The beginning of a text of the file, in one line."""
+    return ascii(" ".join(text[:80].decode("latin-1").split()))

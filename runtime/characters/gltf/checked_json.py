@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import dataclass
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from devices.bounded_json import parse_json
 from runtime.characters.formats.mesh_data import MeshError
 
 MOST_ENTRIES = 1_000_000
@@ -150,9 +150,9 @@ def parse_document(content: bytes) -> Entry:
 
 def _parsed(text: str) -> Any:
     try:
-        return json.loads(text)
+        return parse_json(text)
     except ValueError:
         mended = _NO_NUMBER.sub("NaN", text)
         if mended == text:
             raise
-        return json.loads(mended)
+        return parse_json(mended)

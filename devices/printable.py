@@ -1,0 +1,16 @@
+"""Show a text from a file, an argument or the network, whatever is in it."""
+
+from __future__ import annotations
+
+MOST_LETTERS = 1000
+
+
+def printable(text: str, most: int = MOST_LETTERS) -> str:
+    """The text in one line of at most `most` letters that no terminal takes for a command.
+
+    Blanks and line ends become one blank; control characters, and signs that reverse the direction
+    of writing, become question marks.
+    """
+    line = " ".join(text.split())
+    shown = "".join(letter if letter.isprintable() else "?" for letter in line[:most])
+    return shown if len(line) <= most else f"{shown}..."
