@@ -8,6 +8,7 @@ per line. A frame is an object with "pose_world_landmarks", "poseLandmarks", "ke
 
 from __future__ import annotations
 
+import json
 import math
 import re
 from collections.abc import Iterator, Mapping

@@ -23,6 +23,7 @@ from replay.leap.reader import read_leap
 from replay.mcap.reader import MOST_MEMORY, most_frames
 from replay.mcap.writer import McapWriter
 from replay.mediapipe.text import parse_landmark_text
+from replay.stated import UNSTATED
 
 ARM = Skeleton(("shoulder", "hand"), np.array([-1, 0]), np.eye(3)[:2])
 MIB = 1 << 20
@@ -87,7 +88,7 @@ def test_numbers_beyond_all_bounds_are_no_traceback(number: str) -> None:
     landmarks = ",".join([f'{{"x":0,"y":0,"z":{number}}}'] * 33)
     text = f'[{{"timestamp_ms": {number}, "pose_world_landmarks": [{landmarks}]}}]'
     with suppress(InputError):
-        parse_landmark_text(text.encode())
+        parse_landmark_text(text.encode(), UNSTATED)
 
 
 def test_frames_are_bounded_by_the_file_that_holds_them() -> None:
