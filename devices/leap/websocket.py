@@ -14,6 +14,7 @@ import json
 import threading
 import time
 from collections.abc import Callable, Iterator
+from socket import create_connection
 from typing import Any
 from urllib.parse import SplitResult
 
@@ -55,6 +56,7 @@ class LeapWebSocket:
         except ImportError:
             raise InputError("leap+ws:// needs the extra: pip install 'bunraku[leap]'") from None
         self.version = NEWEST
+        self._address = host, port
         self._where = f"{'[' + host + ']' if ':' in host else host}:{port}"
         self._devices = devices
         self._connection_trouble = ""
@@ -82,8 +84,15 @@ class LeapWebSocket:
         url = f"ws://{self._where}/v{self.version}.json"
         verified = False
         try:
+            # On a socket of our own the library follows no redirect to another host.
+            socket = create_connection(self._address, timeout=PATIENCE)
             with connect(
-                url, open_timeout=PATIENCE, close_timeout=LOOK, max_size=MOST_BYTES, proxy=None
+                url,
+                sock=socket,
+                open_timeout=PATIENCE,
+                close_timeout=LOOK,
+                max_size=MOST_BYTES,
+                proxy=None,
             ) as connection:
                 for data in self._messages(connection):
                     if not verified:
@@ -95,7 +104,8 @@ class LeapWebSocket:
             if code == GOING_AWAY and not verified:
                 self.version = self.version - 1 or NEWEST
             self._connection_trouble = f"{url} closed the connection ({code}); trying again"
-        except (OSError, WebSocketException) as error:
+        except (OSError, ValueError, WebSocketException) as error:
+            # ValueError: an answer that the library cannot take apart, such as a broken address.
             self._connection_trouble = (
                 f"no answer at {url} ({_short(error)}); start the Ultraleap service, or "
                 "UltraleapTrackingWebSocket beside a service that is newer than Orion"

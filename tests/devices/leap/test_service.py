@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import socket
 import sys
 import threading
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -16,6 +18,10 @@ from devices.stream import open_stream
 from tests.devices.leap.leap_messages import HEADER, HOSTILE, both, device_event
 from tests.devices.leap.leap_service import Service, opened, serving
 from tests.waiting import PATIENCE, frames_of, until
+
+
+def listening() -> socket.socket:
+    return socket.create_server(("127.0.0.1", 0))
 
 
 @pytest.fixture(autouse=True)
@@ -113,6 +119,36 @@ def test_a_message_beyond_all_bounds_ends_the_connection_not_the_stream() -> Non
     with serving(serve) as (service, port), opened(port) as stream:
         frames_of(stream, 1)
     assert len(service.paths) == 2
+
+
+@pytest.mark.parametrize(
+    "answer",
+    [
+        "302 Found\r\nLocation: ws://127.0.0.1:{elsewhere}/v6.json\r\nContent-Length: 0",
+        "302 Found\r\nLocation: ws://[::1/v6.json\r\nContent-Length: 0",  # no address
+        "200 OK\r\n" + "X: y\r\n" * 5000,
+    ],
+)
+def test_an_answer_that_leads_astray_is_not_followed_and_ends_no_thread(answer: str) -> None:
+    with listening() as server, listening() as elsewhere:
+        reply = f"HTTP/1.1 {answer.format(elsewhere=elsewhere.getsockname()[1])}\r\n\r\n".encode()
+
+        def serve() -> None:
+            for _ in range(2):  # it is asked again
+                connection, _ = server.accept()
+                with connection, suppress(OSError):
+                    connection.recv(4096)
+                    connection.sendall(reply)
+
+        thread = threading.Thread(target=serve, daemon=True)
+        thread.start()
+        with opened(server.getsockname()[1]) as stream:
+            thread.join(PATIENCE)
+            assert not thread.is_alive()
+            until(lambda: "no answer at ws://127.0.0.1" in stream.traffic.trouble)
+        elsewhere.setblocking(False)
+        with pytest.raises(BlockingIOError):
+            elsewhere.accept()
 
 
 def test_closing_while_nobody_answers_takes_no_time() -> None:
