@@ -11,8 +11,8 @@ _MARKS = ((b"\xef\xbb\xbf", "utf-8"), (b"\xff\xfe", "utf-16-le"), (b"\xfe\xff", 
 _CONTROLS = bytes(range(0x80, 0xA0))  # control characters in Latin-1, first bytes in Shift-JIS
 
 
-def file_text(path: Path, most: int = MOST_BYTES) -> str:
-    """Return the text of a file of at most `most` bytes.
+def file_bytes(path: Path, most: int = MOST_BYTES) -> bytes:
+    """Return a file of at most `most` bytes.
 
     Raises:
         InputError: the file cannot be read or is larger.
@@ -24,7 +24,16 @@ def file_text(path: Path, most: int = MOST_BYTES) -> str:
         raise InputError(f"cannot read {path}: {error.strerror or error}") from error
     if len(raw) > most:
         raise InputError(f"{path}: larger than {most >> 20} MiB; split the recording")
-    return decoded(raw)
+    return raw
+
+
+def file_text(path: Path, most: int = MOST_BYTES) -> str:
+    """Return the text of a file of at most `most` bytes.
+
+    Raises:
+        InputError: the file cannot be read or is larger.
+    """
+    return decoded(file_bytes(path, most))
 
 
 def decoded(raw: bytes) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.errors import InputError
+from replay.text_file import file_bytes
 
 Array = NDArray[np.float64]
 
@@ -22,12 +23,7 @@ def read_lines(path: Path) -> list[str]:
     Raises:
         InputError: the file cannot be read, is too large, or is not text.
     """
-    try:
-        if path.stat().st_size > MOST_BYTES:
-            raise InputError(f"{path}: larger than {MOST_BYTES // 2**20} MiB; split the recording")
-        raw = path.read_bytes()
-    except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror or error}") from error
+    raw = file_bytes(path, MOST_BYTES)
     if raw.count(b"\n") > MOST_LINES:
         raise InputError(f"{path}: more than {MOST_LINES} lines; split the recording")
     try:

@@ -32,6 +32,7 @@ from replay.mediapipe.text import has_landmark_text, parse_landmark_text
 from replay.orientation import floor_and_start, yaw_to_front
 from replay.recording import Recording
 from replay.stated import UNSTATED, Stated
+from replay.text_file import file_bytes
 
 Array = NDArray[np.float64]
 
@@ -53,13 +54,7 @@ def read_mediapipe(path: Path, stated: Stated = UNSTATED) -> Recording:
     Raises:
         InputError: the file cannot be read, is damaged, or holds no landmark of MediaPipe's.
     """
-    try:
-        with path.open("rb") as file:
-            data = file.read(MAX_FILE + 1)
-    except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror or error}") from error
-    if len(data) > MAX_FILE:
-        raise InputError(f"{path} is larger than {MAX_FILE >> 20} MiB")
+    data = file_bytes(path, MAX_FILE)
     try:
         if has_pose_header(data):
             people, notes = _people(parse_pose(data))
