@@ -19,6 +19,9 @@ _DEAD = 2000  # [ms] without a heartbeat, after which a connection counts as bro
 _RECONNECT = (100, 1000)  # [ms] first and longest pause before the next attempt
 _LINGER = 100  # [ms] that closing waits for the last message
 _QUEUE = 1000  # messages that wait to be read
+_TO_SEND = (
+    2400  # messages that wait to be sent: twice the credit of a lossless subscriber, and more
+)
 
 Socket = zmq.Socket[bytes]
 Context = zmq.Context[Socket]
@@ -53,7 +56,9 @@ def bridge_socket(
     socket.ipv6 = "[" in endpoint
     socket.maxmsgsize = MAX_MESSAGE
     socket.rcvhwm = _QUEUE
-    socket.sndhwm = 0  # the subscriber's credit bounds the frames in transit
+    # The credit bounds the frames to a subscriber that is honest; of one that never reads, the rest
+    # is dropped.
+    socket.sndhwm = _TO_SEND
     socket.heartbeat_ivl = _HEARTBEAT
     socket.heartbeat_timeout = _DEAD
     socket.reconnect_ivl, socket.reconnect_ivl_max = _RECONNECT

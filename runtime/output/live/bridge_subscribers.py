@@ -7,6 +7,7 @@ subscriber starts first, late, or again.
 
 from __future__ import annotations
 
+import math
 import secrets
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -27,19 +28,24 @@ from devices.skeleton import Skeleton, SkeletonFrame
 from runtime.output.live.bridge_queue import BridgeQueue, LatestQueue, LosslessQueue, Parcel
 
 MOST_SUBSCRIBERS = 32
+MOST_CREDIT = 1024  # frames on their way to a subscriber; whoever claims more gets no more
+ANNOUNCED = 0.2  # [s] at least between two announcements to the same subscriber
+QUIET = 2.0  # [s] of silence, of many beats, after which another may take a subscriber's place
 SILENCE = {True: 10.0, False: 120.0}
 """Silence [s] after which a subscriber is dropped: one in latest mode, and one in lossless mode."""
 
 
 @dataclass(slots=True)
 class _Subscriber:
-    """One subscriber: its connection, the time of its last call [s], its queue and credit."""
+    """One subscriber: its connection, the times [s] of its last call and of the last announcement
+    to it, its queue and credit."""
 
     route: bytes
     heard_at: float
     latest: bool
     queue: BridgeQueue
     credit: int = 0
+    announced_at: float = -math.inf
 
     def gone(self, now: float) -> bool:
         return now - self.heard_at > SILENCE[self.latest]
@@ -146,7 +152,7 @@ class BridgeSubscribers:
             subscriber.route = route
             subscriber.queue.reconnect(call.received)
         subscriber.queue.received(call.received)
-        subscriber.heard_at, subscriber.credit = heard_at, call.credit
+        subscriber.heard_at, subscriber.credit = heard_at, min(call.credit, MOST_CREDIT)
         answer = Answer(
             self._session,
             subscriber.queue.sent,
@@ -154,12 +160,27 @@ class BridgeSubscribers:
             heard_at,
             answered_at=self._clock(),
         )
+        replies = [encode_answer(answer)]
         confirmed = call.session == self._session
-        return [encode_answer(answer), *([] if confirmed else [self._announcement])]
+        if not confirmed and heard_at - subscriber.announced_at >= ANNOUNCED:
+            subscriber.announced_at = heard_at
+            replies.append(self._announcement)
+        return replies
 
     def _welcome(self, route: bytes, call: Call, heard_at: float) -> _Subscriber | None:
+        """Give a place to a new subscriber; None where all are taken.
+
+        A connection has one place: who invents numbers takes no other's. Where all are taken, the
+        one that has been silent for longest gives way.
+        """
+        for client, other in list(self._subscribers.items()):
+            if other.route == route:
+                self._dismiss(client)
         if len(self._subscribers) >= MOST_SUBSCRIBERS:
-            return None
+            quietest = min(self._subscribers, key=lambda each: self._subscribers[each].heard_at)
+            if heard_at - self._subscribers[quietest].heard_at < QUIET:
+                return None
+            self._dismiss(quietest)
         latest = call.mode == LATEST
         queue = LatestQueue(self.frames) if latest else LosslessQueue(self.frames)
         self._subscribers[call.client] = subscriber = _Subscriber(route, heard_at, latest, queue)

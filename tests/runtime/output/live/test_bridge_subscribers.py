@@ -10,6 +10,7 @@ import pytest
 from devices.bridge.messages import (
     LATEST,
     LOSSLESS,
+    MAX_CREDIT,
     VERSION,
     Call,
     Sample,
@@ -24,7 +25,14 @@ from devices.bridge.receiver import BEAT, CREDIT, BridgeReceiver
 from devices.builtin.body import builtin_skeleton
 from devices.skeleton import Skeleton, SkeletonFrame
 from runtime.output.live.bridge_queue import LosslessQueue, Parcel
-from runtime.output.live.bridge_subscribers import MOST_SUBSCRIBERS, SILENCE, BridgeSubscribers
+from runtime.output.live.bridge_subscribers import (
+    ANNOUNCED,
+    MOST_CREDIT,
+    MOST_SUBSCRIBERS,
+    QUIET,
+    SILENCE,
+    BridgeSubscribers,
+)
 
 BODY = Skeleton(("hips", "hand"), np.array([-1, 0]), np.array([[0.0, 1.0, 0.0], [0.5, 1.0, 0.0]]))
 
@@ -103,6 +111,7 @@ def test_the_skeleton_is_told_until_it_was_heard() -> None:
     wire.under_way = wire.under_way[:1]  # the announcement is lost
     wire.deliver()
     assert wire.receiver.skeleton is None
+    wire.now += ANNOUNCED
     wire.exchange()
     assert wire.receiver.skeleton is not None
     wire.call()
@@ -294,6 +303,31 @@ def test_a_stage_calls_in_a_steady_beat_and_before_it_runs_dry() -> None:
     wire.deliver()
     assert wire.receiver.call_due(wire.now)
     assert not wire.receiver.call_due(wire.now, waiting=1), "there is no room for more"
+
+
+def test_invented_subscribers_shut_out_no_honest_stage() -> None:
+    """A connection has one place, and who has fallen silent gives way where all are taken."""
+    wire = Wire(LATEST)
+    for client in range(1, 41):
+        wire.subscribers.read(b"one", encode_call(Call(client, 0, 0, 0.0, 4, LATEST)))
+    assert wire.subscribers.count == 1
+    for client in range(1, 41):
+        wire.subscribers.read(b"r%d" % client, encode_call(Call(client, 0, 0, 0.0, 4, LATEST)))
+    assert wire.subscribers.count == MOST_SUBSCRIBERS
+    wire.now += QUIET
+    wire.exchange()
+    wire.subscribers.publish(frame(5))
+    assert [number_of(heard) for heard in wire.exchange()] == [5]
+
+
+def test_who_never_reads_is_sent_no_more_than_its_credit_and_one_announcement() -> None:
+    wire = Wire(LATEST)
+    call = Call(7, 0, 0, 0.0, MAX_CREDIT, LOSSLESS)
+    replies = [wire.subscribers.read(b"deaf", encode_call(call)) for _ in range(1000)]
+    assert [len(each) for each in replies] == [2] + [1] * 999
+    for index in range(2 * MOST_CREDIT):
+        wire.subscribers.publish(frame(index))
+    assert len(list(wire.subscribers.due())) == MOST_CREDIT
 
 
 def test_silent_stages_are_forgotten_and_places_are_few() -> None:
