@@ -133,10 +133,17 @@ class McapReader:
                 topics[record.id] = record.topic
             if isinstance(record, Message) and topics.get(record.channel_id) == SKELETON_TOPIC:
                 return self._skeleton(record.data)
+        if not self._is_whole():
+            raise InputError(f"{self.path} is cut off before its skeleton; copy it again")
         raise InputError(
             f"{self.path} is an MCAP file without a Bunraku skeleton; "
             "only recordings made by `bunraku record` or `--record` can be replayed"
         )
+
+    def _is_whole(self) -> bool:
+        """Whether the file ends as a finished MCAP file does."""
+        self._file.seek(max(self._size - len(MAGIC), 0))
+        return self._file.read(len(MAGIC)) == MAGIC
 
     def _skeleton(self, text: str | bytes) -> Skeleton:
         try:

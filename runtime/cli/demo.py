@@ -23,12 +23,13 @@ def run(options: argparse.Namespace) -> int:
     from replay.builtin import builtin_recording
     from runtime.characters.builtin import BUILTIN
     from runtime.cli.performing import perform
+    from runtime.show import messages
     from runtime.show.open_stream import play
 
     options.character = options.character or list(BUILTIN)
     if not _has_display():
         options.headless = options.fast = True
-    return perform(
+    code = perform(
         options,
         lambda: play(
             builtin_recording("show"),
@@ -38,6 +39,10 @@ def run(options: argparse.Namespace) -> int:
         ),
         origin="show",
     )
+    kept = (options.video, options.frames, options.cache, options.report, options.export)
+    if options.headless and not any(kept):
+        messages.announce("nothing was kept: add --video demo.mp4 to look at the show")
+    return code
 
 
 def _has_display() -> bool:

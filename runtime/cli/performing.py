@@ -12,6 +12,7 @@ from replay.player import Player
 from runtime.characters.open_character import load_character
 from runtime.cli.options.show_options import show_settings
 from runtime.cli.warm import warm_up
+from runtime.control.keys import key_hint
 from runtime.show import messages
 from runtime.show.collector_pauses import collector_paused
 from runtime.show.outputs import check_outputs
@@ -60,6 +61,8 @@ def perform(
 def _run(show: Show, stream: SkeletonStream) -> None:
     total = len(stream.recording) if isinstance(stream, Player) and not stream.loop else None
     told: dict[str, object] = {}
+    if show.settings.window:
+        messages.announce(f"{key_hint()}; docs/remote.md lists all")
     _tell_parts(show, told)
     with Progress("performing", total) as progress:
 

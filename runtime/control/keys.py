@@ -42,6 +42,22 @@ KEYS = {
 """The action of each key."""
 
 
+_HINTED = {
+    "match-again": "match again",
+    "next-match": "step through matches",
+    "hold": "pause",
+    "record": "record a take",
+    "frame-all": "frame everybody",
+    "leave": "leave",
+}
+
+
+def key_hint() -> str:
+    """One line on the most useful keys, for somebody who has just opened the window."""
+    key_of = {name: key for key, name in KEYS.items()}
+    return "keys: " + ", ".join(f"{key_of[name]} to {words}" for name, words in _HINTED.items())
+
+
 class WindowControls:
     """Runs the show by the window's keys and mouse.
 

@@ -90,6 +90,7 @@ def show_settings(options: argparse.Namespace, origin: str) -> ShowSettings:
             f"--performers {options.performers} needs as many characters, got {count}; give "
             "--character more often"
         )
+    _refuse_matching_without_chains(options)
     return ShowSettings(
         size=options.size,
         window=not options.headless,
@@ -115,6 +116,21 @@ def show_settings(options: argparse.Namespace, origin: str) -> ShowSettings:
         remote=_remote(options),
         origin=origin,
     )
+
+
+def _refuse_matching_without_chains(options: argparse.Namespace) -> None:
+    """Refuse a choice of matched chains beside a way of driving that has none."""
+    asked = {
+        "--match": options.match > 1,
+        "--mapping": options.mapping is not None,
+        "--chains stop": options.chains == "stop",
+        "--flip": options.flip,
+    }
+    if options.drive == "absolute" and any(asked.values()):
+        option = next(name for name, given in asked.items() if given)
+        raise InputError(
+            f"{option} chooses matched chains, and --drive absolute has none; leave one of both out"
+        )
 
 
 def _background(options: argparse.Namespace) -> Background | None:

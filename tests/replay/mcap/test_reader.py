@@ -364,6 +364,13 @@ def test_a_file_of_another_program_is_refused(tmp_path: Path) -> None:
         read_mcap(foreign(tmp_path / "a.mcap", b"{}", skeleton=False))
 
 
+def test_a_recording_that_is_cut_off_before_its_skeleton_says_so(tmp_path: Path) -> None:
+    path = foreign(tmp_path / "a.mcap", b"{}", skeleton=False)
+    path.write_bytes(path.read_bytes()[:-100])
+    with pytest.raises(InputError, match="cut off before its skeleton"):
+        read_mcap(path)
+
+
 def test_a_frame_of_another_skeleton_is_refused(tmp_path: Path) -> None:
     with (
         McapWriter(tmp_path / "a.mcap", ARM) as writer,

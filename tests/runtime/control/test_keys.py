@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,7 +13,7 @@ import pytest
 from replay.player import EveryFrame, Player
 from runtime.characters.character import Character
 from runtime.control.actions import ACTIONS
-from runtime.control.keys import KEYS, WindowControls
+from runtime.control.keys import KEYS, WindowControls, key_hint
 from runtime.control.window import Event, KeyPressed, Resized
 from runtime.render.camera import Camera, front_camera
 from tests.runtime.staged import SIZE, StagedShow
@@ -93,6 +94,14 @@ def test_a_key_does_what_its_action_does(
         states.append((show.state(), shown, show.controls.leaving, show.stream.position))
         show.close()
     assert states[0] == states[1]
+
+
+def test_the_hint_names_keys_that_do_what_it_says() -> None:
+    hint = key_hint()
+    for key, words in re.findall(r"([\w.]+) to ([a-z ]+)", hint):
+        assert KEYS[key] in ACTIONS, words
+    assert "m to match again" in hint
+    assert "escape to leave" in hint
 
 
 def test_a_key_that_is_held_down_turns_no_switch_over_again_but_steps_on(show: Seat) -> None:

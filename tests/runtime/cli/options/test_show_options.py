@@ -90,6 +90,10 @@ def test_the_demo_has_a_size_and_a_rate_of_its_own() -> None:
     [
         (("--performers", "2"), "--performers 2"),
         (("--remote-feedback", "9000"), "--remote-feedback"),
+        (("--drive", "absolute", "--match", "2"), "--match"),
+        (("--drive", "absolute", "--chains", "stop"), "--chains stop"),
+        (("--drive", "absolute", "--mapping", "m.json"), "--mapping"),
+        (("--drive", "absolute", "--flip"), "--flip"),
     ],
 )
 def test_options_that_contradict_each_other_are_refused_by_their_names(

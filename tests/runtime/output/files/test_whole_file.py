@@ -63,6 +63,10 @@ def test_a_failing_disk_is_one_line_that_names_the_file(tmp_path: Path) -> None:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
     assert "x.pc2" in str(caught.value)
     assert os.strerror(errno.ENOSPC) in str(caught.value)
+    assert "free some space" in str(caught.value)
+    with pytest.raises(InputError) as caught, writing(tmp_path / "x.pc2"):
+        raise OSError(errno.EACCES, os.strerror(errno.EACCES))
+    assert "space" not in str(caught.value), "that would not help"
     assert "\n" not in str(caught.value)
 
 
