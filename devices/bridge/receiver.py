@@ -37,7 +37,6 @@ CREDIT = {LATEST: 16, LOSSLESS: 1024}
 that a slow network does not buffer old ones."""
 
 CORRECTION = 0.1  # [s] by which a better clock offset may move a frame's time back
-OLDEST = 3600.0  # [s] of a frame when it comes: no queue holds more
 PERFORMERS = 256  # performers whose newest time is remembered
 
 
@@ -161,9 +160,6 @@ class BridgeReceiver:
         self.lost += sample.sequence - self._came - 1
         self._came = sample.sequence
         time = min(sample.time - self.clock.seconds, arrival)
-        if arrival - time > OLDEST:
-            self.refused += 1
-            return []
         return [sample.frame(self._rising(sample.performer, time), arrival, self._face_of(sample))]
 
     def _face_of(self, sample: Sample) -> Blends | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from urllib.parse import urlsplit
 
 from runtime.cli.options.show_options import add_character_option, add_show_options
 
@@ -41,7 +40,7 @@ def is_camera(url: str) -> bool:
 
 def for_performers(url: str, count: int) -> str:
     """A webcam's or film's address with the number of performers, unless it has one."""
-    address = urlsplit(url)
-    if address.scheme != "webcam" or count == 1 or "people=" in address.query:
+    path, _, query = url.partition("?")
+    if not path.startswith(CAMERA) or count == 1 or "people=" in query:
         return url
-    return f"{url}{'&' if address.query else '?'}people={count}"
+    return f"{path}?{query}{'&' if query else ''}people={count}"
