@@ -6,7 +6,9 @@ import argparse
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import TypeGuard
 
+from devices.errors import InputError
 from devices.stream import SkeletonStream
 from replay.player import Player
 from runtime.characters.open_character import load_character
@@ -15,6 +17,7 @@ from runtime.cli.warm import warm_up
 from runtime.control.keys import key_hint
 from runtime.show import messages
 from runtime.show.collector_pauses import collector_paused
+from runtime.show.interrupts import Interrupted
 from runtime.show.outputs import check_outputs
 from runtime.show.pacing import AtOnce
 from runtime.show.progress import Progress
@@ -37,7 +40,8 @@ def perform(
         read: files that are read and must not be written, each with the name of its option.
 
     Raises:
-        InputError: anything that a user can put right.
+        InputError: anything that a user can put right; at the end, also for files that are not
+            whole.
     """
     settings = show_settings(options, origin)
     names = [Path(name).stem for name in options.character]
@@ -50,16 +54,44 @@ def perform(
     with source as stream:
         with collector_paused():
             characters = [load_character(name) for name in options.character]
-        with Show(stream, characters, settings, pace=AtOnce() if options.fast else None) as show:
-            _run(show, stream)
+        if not settings.is_noticed and not _ends(stream):
+            messages.warn(
+                "this show has no window, file or sender, and runs until Ctrl-C: nobody sees it"
+            )
+        show = Show(stream, characters, settings, pace=AtOnce() if options.fast else None)
+        try:
+            with show:
+                _run(show, stream)
+        except Interrupted:
+            _tell_kept(show)
+            raise
+        _tell_kept(show)
         traffic = getattr(stream, "traffic", None)
         if traffic is not None and (why := traffic.unused(origin)):
             messages.warn(why)
     return 0
 
 
+def _ends(stream: SkeletonStream) -> TypeGuard[Player]:
+    """Whether a stream has an end."""
+    return isinstance(stream, Player) and not stream.loop
+
+
+def _tell_kept(show: Show) -> None:
+    """Say of each file what it holds.
+
+    Raises:
+        InputError: some are not whole.
+    """
+    for kept in show.kept:
+        messages.announce(str(kept))
+    faulty = [str(kept.path) for kept in show.kept if kept.fault]
+    if faulty:
+        raise InputError(f"not kept whole: {', '.join(faulty)}")
+
+
 def _run(show: Show, stream: SkeletonStream) -> None:
-    total = len(stream.recording) if isinstance(stream, Player) and not stream.loop else None
+    total = len(stream.recording) if _ends(stream) else None
     told: dict[str, object] = {}
     if show.settings.window:
         messages.announce(f"{key_hint()}; docs/remote.md lists all")

@@ -27,6 +27,7 @@ from runtime.driving.performer import Performer
 from runtime.driving.puppet_match import Choices
 from runtime.driving.rehearsal import rehearse
 from runtime.output.files.export import OF_NODES
+from runtime.output.files.kept_file import Kept, KeptFile, size_of
 from runtime.output.output import Output
 from runtime.output.report.report import Report
 from runtime.puppet.deformable_surface import Elasticity
@@ -138,6 +139,13 @@ class OpenedShow:
         driven = [parts for session in sessions for parts in session.parts]
         for part, mapping, parts in zip(self._parts, mappings, driven, strict=True):
             part.matched(mapping.score, parts, skeleton)
+
+    @property
+    def kept(self) -> list[Kept]:
+        """What lies where the show wrote files, once it is closed."""
+        outputs = [output for own in self._outputs for output in own]
+        files = [output.kept for output in outputs if isinstance(output, KeptFile)]
+        return [*files, *self.controls.takes.kept, *self._kept_report]
 
     @property
     def _recording(self) -> Recording | None:
@@ -270,7 +278,8 @@ class OpenedShow:
                 )
 
     def _open_loop(self, own: Sequence[Output]) -> FrameLoop:
-        self._closing.enter_context(self.report)
+        self._kept_report: list[Kept] = []
+        self._closing.callback(self._keep_report)
         outputs = open_outputs(
             self._settings,
             [
@@ -282,6 +291,7 @@ class OpenedShow:
             self._closing,
             warn=self._warn,
         )
+        self._outputs = outputs
         outputs[0].extend(self._closing.enter_context(output) for output in own)
         loop = FrameLoop(
             self._stream,
@@ -295,6 +305,18 @@ class OpenedShow:
         )
         self._closing.callback(self.complete_report)
         return loop
+
+    def _keep_report(self) -> None:
+        path = self._settings.files.report
+        if path is None:
+            return
+        try:
+            self.report.close()
+        except InputError as error:
+            self._warn(str(error))
+            self._kept_report.append(Kept(path, "not written", str(error)))
+        else:
+            self._kept_report.append(Kept(path, size_of(path)))
 
     def _open_controls(self) -> ShowControls:
         return ShowControls(

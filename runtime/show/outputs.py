@@ -14,6 +14,7 @@ from replay.bounds import check_recordable
 from runtime.characters.character import Character
 from runtime.output.files.export import SUFFIXES, open_export
 from runtime.output.files.frames import Frames
+from runtime.output.files.kept_file import KeptFile
 from runtime.output.files.point_cache import PointCache
 from runtime.output.files.video import Video, encoder_for
 from runtime.output.files.whole_file import check_suffix, check_writable
@@ -84,28 +85,35 @@ def open_outputs(
         performer: the skeleton of all performers.
         rate: about how many frames a second will come.
         closing: closes what was opened.
-        warn: takes a line about a sender that fails during the show.
+        warn: takes a line about a file or sender that fails during the show.
 
     Raises:
         InputError: a suffix is unknown, a library is missing, or a file cannot be written.
     """
     files, senders = settings.files, settings.senders
+
+    def kept(path: Path, output: Output, *, at_the_end: bool = False) -> KeptFile:
+        file = KeptFile(path, output, at_the_end=at_the_end, tell=warn)
+        return closing.enter_context(file)
+
     names = distinct_names([character.name for character, _ in characters])
     outputs: list[list[Output]] = []
     for name, (character, part) in zip(names, characters, strict=True):
         own: list[Output] = [part]
         if files.export is not None:
-            export = open_export(_of(files.export, name, names), character, rate=rate)
-            own.append(closing.enter_context(export))
+            path = _of(files.export, name, names)
+            own.append(kept(path, open_export(path, character, rate=rate), at_the_end=True))
         if files.cache is not None:
-            cache = PointCache(_of(files.cache, name, names), character)
-            own.append(closing.enter_context(cache))
+            path = _of(files.cache, name, names)
+            own.append(kept(path, PointCache(path, character)))
         outputs.append(own)
     if files.video is not None:
         video = Video(files.video, rate=rate, pictures_a_second=settings.fps)
-        outputs[0].append(closing.enter_context(video))
+        outputs[0].append(kept(files.video, video))
+        if settings.transparent:
+            warn(f"{files.video} is black where it is transparent: --frames keeps transparency")
     if files.frames is not None:
-        outputs[0].append(closing.enter_context(Frames(files.frames)))
+        outputs[0].append(kept(files.frames, Frames(files.frames)))
     for broadcast in _open_broadcasts(settings, warn):
         outputs[0].append(closing.enter_context(broadcast))
     if senders.publish is not None:

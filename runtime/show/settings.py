@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 
 from devices.errors import InputError
@@ -254,6 +254,16 @@ class ShowSettings:
     def transparent(self) -> bool:
         """Whether pictures show nothing behind the characters."""
         return self.background is not None and self.background.alpha == 0
+
+    @property
+    def is_noticed(self) -> bool:
+        """Whether anybody gets anything of the show: by a window, file, sender or remote."""
+        asked: list[object] = [
+            *(getattr(self.files, each.name) for each in fields(self.files)),
+            *(getattr(self.senders, each.name) for each in fields(self.senders)),
+            self.remote,
+        ]
+        return self.window or any(one is not None for one in asked)
 
     @property
     def needs_pictures(self) -> bool:

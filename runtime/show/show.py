@@ -18,6 +18,7 @@ from devices.stream import SkeletonStream
 from replay.playback import Playback, playback_of
 from runtime.characters.character import Character
 from runtime.driving.drivers import DriverFactory
+from runtime.output.files.kept_file import Kept
 from runtime.output.output import Output
 from runtime.output.report.report import Report
 from runtime.puppet.puppet import Motion
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
 
 class Show:
     """Drives characters by the frames of a stream.
+
+    A file whose disk fails is told to `warn`, and the show goes on without it: see `kept`.
 
     The constructor opens everything: the solvers, the window, every file. `close`, or the end of a
     ``with`` block, finishes every file, also after an error. `run` performs to the end; a loop of
@@ -198,6 +201,11 @@ class Show:
         """The figures of the show so far; ``report.summary()`` has the keys of docs/outputs.md."""
         self._opened.complete_report()
         return self._opened.report
+
+    @property
+    def kept(self) -> list[Kept]:
+        """What lies where the show wrote files, and with what fault; once it is closed."""
+        return self._opened.kept
 
     @property
     def playback(self) -> Playback | None:

@@ -10,6 +10,7 @@ from typing import Self
 from devices.errors import InputError
 from replay.recorded_stream import RecordedStream
 from replay.recorder import Recorder
+from runtime.output.files.kept_file import Kept, counting, size_of
 
 MOST = 9999  # takes in one folder under one name
 
@@ -26,6 +27,9 @@ class Takes:
         open_recorder: opens the file of a take.
         tell: takes one line on a fault.
         waits: whether the stream may wait for the disk, so that no frame is lost.
+
+    Attributes:
+        kept: what lies where takes were written, in the order in which they ended.
     """
 
     def __init__(
@@ -44,6 +48,7 @@ class Takes:
         self._waits = waits
         self._recorder: Recorder | None = None
         self._ending: list[threading.Thread] = []
+        self.kept: list[Kept] = []
 
     @property
     def recording(self) -> bool:
@@ -72,8 +77,14 @@ class Takes:
             return
         self._stream.keep = None
         self._ending = [thread for thread in self._ending if thread.is_alive()]
-        self._ending.append(threading.Thread(target=recorder.close, name="take"))
+        self._ending.append(threading.Thread(target=self._end, args=[recorder], name="take"))
         self._ending[-1].start()
+
+    def _end(self, recorder: Recorder) -> None:
+        recorder.close()
+        lost = f", {recorder.lost} lost" if recorder.lost else ""
+        said = f"{counting(recorder.frames, 'frame')}{lost}, {size_of(recorder.path)}"
+        self.kept.append(Kept(recorder.path, said, recorder.fault))
 
     def close(self) -> None:
         """End the running take and wait until all takes are written; may be called twice."""

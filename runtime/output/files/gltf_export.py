@@ -107,6 +107,17 @@ class GltfExport:
         _add_animation(builder, self._character, self._motion.motion(), self._morphs)
         builder.save(self._path)
 
+    @property
+    def error(self) -> str:
+        """How far the skinned surface is from the performed one, in words; empty before `close`."""
+        off = self.deviation
+        if off is None:
+            return ""
+        return (
+            f"skinned {_millimetres(off.rms)} mm from the performed surface (RMS), "
+            f"{_millimetres(off.greatest)} mm at most"
+        )
+
     def _fitted_skin(self) -> Skin:
         vertices, tree = self._character.vertices, self._character.skeleton.tree
         frames = self._samples
@@ -286,3 +297,8 @@ def _vertex_normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> 
         normals, lengths, out=np.tile([0.0, 1.0, 0.0], (len(vertices), 1)), where=lengths > 0
     )
     return unit
+
+
+def _millimetres(metres: float) -> str:
+    """For reading; two digits below ten."""
+    return f"{1e3 * metres:.2g}" if metres < 0.01 else f"{1e3 * metres:.0f}"

@@ -43,7 +43,8 @@ def test_replay_writes_everything_it_is_asked_for(
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith(f"{CHARACTER}: left leg -> left leg, relative, 100 %; ")
-    assert done.stdout.count("\n") == 1
+    told = ["e.glb", "c.pc2", "v.mp4", "pictures", "again.mcap", "r.json"]
+    assert [line.split(":")[0] for line in done.stdout.splitlines()] == [CHARACTER, *told]
     _check_report(json.loads((tmp_path / "r.json").read_text()))
     cache = point_cache(tmp_path / "c.pc2")
     assert cache.shape == (FRAMES, len(builtin_character(CHARACTER).surface.vertex), 3)

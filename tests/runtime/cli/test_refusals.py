@@ -156,7 +156,7 @@ def test_nothing_is_written_over_what_is_read(
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
-@pytest.mark.parametrize("option", ["--cache", "--report", "--record"])
+@pytest.mark.parametrize("option", ["--cache", "--record"])
 def test_a_full_disk_is_told_in_one_line(recording: Path, bunraku: Run, option: str) -> None:
     done = bunraku("replay", recording, "--character", "paper", *SMALL, option, "/dev/full")
     _told(done, "/dev/full")

@@ -108,3 +108,18 @@ def test_only_a_background_that_is_not_there_is_transparent() -> None:
 
 def test_the_energies_are_those_of_the_solver() -> None:
     assert solvers.arap.ENERGIES == ENERGIES
+
+
+@pytest.mark.parametrize(
+    "settings",
+    [
+        ShowSettings(window=True),
+        ShowSettings(files=FileSettings(report=Path("r.json"))),
+        ShowSettings(senders=SenderSettings(vmc=("127.0.0.1", None))),
+        ShowSettings(remote=RemoteSettings(("127.0.0.1", 0))),
+    ],
+    ids=["window", "file", "sender", "remote"],
+)
+def test_a_show_is_noticed_by_any_way_out(settings: ShowSettings) -> None:
+    assert settings.is_noticed
+    assert not ShowSettings().is_noticed
