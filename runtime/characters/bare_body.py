@@ -11,6 +11,7 @@ from devices.bodies.rest_heading import rest_heading
 from devices.skeleton import Skeleton
 from runtime.characters.body_nodes.body_nodes import body_nodes
 from runtime.characters.character import Character
+from runtime.characters.creatures.limbless import plan_of_limbless
 from runtime.characters.creatures.many_legs import plan_of_many_legs
 from runtime.characters.plan_by_shape import plan_by_shape
 from solvers.skeleton.limbs import surface_points
@@ -38,6 +39,7 @@ def with_body_by_shape(character: Character) -> Character:
     plan = plan_by_shape(*surface, skeleton.tree, planes)
     if plan is None or character.weights is not None:
         plan = plan or plan_of_many_legs(*surface, skeleton.tree, planes)
+        plan = plan or plan_of_limbless(*surface, skeleton.tree)
         return replace(character, skeleton=skeleton, plan=plan)
     body = body_nodes(
         character.vertices,

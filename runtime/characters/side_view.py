@@ -3,7 +3,7 @@
 From the front a camel hides most of itself, and matching on the screen has few bones to compare.
 The better view is the one in which the bones are longer (AniMesh, section 8, "preferable
 viewpoint"). A character that is much longer than wide, with longer bones from the side, is turned
-by a quarter to its left.
+by a quarter to its left. One without limbs, such as a snake, sways: this is seen from the front.
 """
 
 from __future__ import annotations
@@ -21,6 +21,9 @@ _TO_THE_LEFT = np.array([[0.0, 0.0, 1.0], [0.0, 1.0, 0.0], [-1.0, 0.0, 0.0]])
 
 def turned_to_best_side(character: Character) -> Character:
     """Return the character, turned by a quarter if it is long and its side shows more bones."""
+    plan = character.plan
+    if plan is not None and not plan.arms and not plan.legs:
+        return character
     width, _, length = np.ptp(character.vertices, axis=0)
     if length < LONG * width or _bones_seen(character, 2) < MORE * _bones_seen(character, 0):
         return character

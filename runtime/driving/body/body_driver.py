@@ -20,6 +20,7 @@ from runtime.driving.body.long_arms import LongArms
 from runtime.driving.body.many_legs import ManyLegs
 from runtime.driving.body.path import Path
 from runtime.driving.body.rearing import Rearing
+from runtime.driving.body.serpent import Serpent, is_serpent
 from runtime.driving.body.upright import upright_at_rest, upright_in_poses
 from runtime.driving.driver import Highlight, Needs
 from runtime.driving.pairing import Pairing
@@ -108,12 +109,15 @@ class BodyDriver:
             self._bearing = low_bearing(room, half)
             self._many_legs = ManyLegs(bodies, parts.steps, room)
             self._ratio = self._many_legs.ratio
+        self._serpent = Serpent(bodies) if is_serpent(bodies, vertices) else None
+        if self._serpent is not None:
+            self._ratio = self._serpent.reach / max(float(np.ptp(bodies.upright[:, 1])), 1e-9)
         # Who sits before a camera, or lends one arm only, does not move the whole.
-        self._goes_along = len(parts.legs) == len(SIDES)
+        self._their_hips = _hips_that_lead(bodies)
+        self._goes_along = len(parts.legs) == len(SIDES) or bool(self._their_hips)
         self._sinking = 1.0
         self._hips = [bodies.tree.root]
-        self._their_hips: list[int] = []
-        if self._goes_along:
+        if len(parts.legs) == len(SIDES):
             self._hips = [leg.target[0] for leg in parts.legs]
             self._their_hips = [leg.source[0] for leg in parts.legs]
             theirs = float(np.linalg.norm(np.diff(bodies.upright[self._their_hips], axis=0)))
@@ -176,6 +180,8 @@ class BodyDriver:
         self._footing.watch(pose)
         left = rotate(self._trunk[0], self._left)
         trunk = self._rearing.reared(self._trunk, joints, left)
+        if self._serpent is not None:
+            trunk = self._serpent.bearing(joints).of(trunk)
         if self._bearing is not None:
             trunk = self._bearing.of(trunk)
         self._footing.turn_soles(joints, left, pose.time, given)
@@ -329,6 +335,14 @@ def _two_bodies(pairing: Pairing) -> tuple[TwoBodies, float]:
         facing=facing,
     )
     return bodies, heading_at_rest
+
+
+def _hips_that_lead(bodies: TwoBodies) -> list[int]:
+    """The performer's hips, if both lead a body that has no limbs; it goes where they go."""
+    legs, plan = bodies.source.legs, bodies.plan
+    if plan.legs or plan.arms or len(legs) < len(SIDES) or not bodies.trunk_drives:
+        return []
+    return [legs[side].upper[0] for side in SIDES]
 
 
 def _ends(bodies: TwoBodies) -> SteadyEnds:

@@ -158,7 +158,6 @@ UNKNOWN = [
     "mesh/arm.obj",
     "mesh/octopus-low.mesh",
     "mesh/bad/teapot.obj",
-    "rig/m2m_model-snake.glb",
 ]
 
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from devices.bodies.body_plan import BodyPlan
 from devices.skeleton import Skeleton
 from runtime.characters.builtin import builtin_character
 from runtime.characters.character import Character
@@ -49,3 +50,9 @@ def test_a_turned_skeleton_stays_inside() -> None:
     low, high = turned.vertices.min(axis=0), turned.vertices.max(axis=0)
     inside = turned.skeleton.rest_positions
     assert ((inside >= low) & (inside <= high)).all()
+
+
+def test_a_snake_sways_toward_the_audience() -> None:
+    long = stretched(builtin_character("trex"), (1.0, 1.0, 4.0))
+    snake = replace(long, plan=BodyPlan((0, 1), (1, 2), 1))
+    assert turned_to_best_side(snake) is snake
