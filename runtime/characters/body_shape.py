@@ -29,6 +29,7 @@ _LIKE = 0.6  # of the longest leg: a limb as long is another leg
 _OVER = 0.25  # of the size: so far from its legs the middle of a body may be
 _ASIDE = 0.03  # of the size: no tail that stands on the floor ends farther from the middle
 _FALLS = 0.25  # of its length: so much a lifted leg leads down
+_LEAP = 0.15  # of the size: the least trunk between two pairs of legs that leap
 _NEAR = 0.25  # of the size, added to the distance of arms from legs: long arms may be far
 _ARMED = 0.2  # of the size: the least arms of a body without legs
 _CLEAR = 0.08  # the greatest cost of theirs
@@ -85,7 +86,7 @@ class BodyShape:
             return None
         standing = self.standing()
         if not standing:
-            return self._on_one_foot()
+            return self._on_one_foot() or self._leaping()
         longest = self.length(standing[0])
         legs = [pair for pair in standing if self.length(pair) >= _LIKE * longest]
         if len(legs) > 2 or not self._balanced(legs) or self._has_lonely_leg(longest):
@@ -161,9 +162,25 @@ class BodyShape:
         """Whether arms are legs that are lifted in running: they hang down from a level trunk."""
         trunk = self._place(arms.root) - self._place(legs.root)
         level = abs(trunk[1]) < float(np.hypot(trunk[0], trunk[2]))
-        falls = [self._place(chain[0])[1] - self._place(chain[-1])[1] for chain in arms.chains]
         like = self.length(arms) > _LIKE * self.length(legs)
-        return bool(level and like and min(falls) > _FALLS * self.length(arms))
+        return bool(level and like and self._falls(arms))
+
+    def _leaping(self) -> Roles | None:
+        """Four legs that are stretched in a leap: two like pairs that hang from a level trunk."""
+        if len(self._halves.pairs) < 2:
+            return None
+        one, other = self._halves.pairs[:2]
+        apart = self._tree.length(self._tree.chain(one.root, other.root)) > _LEAP * self.size
+        tips = [chain[-1] for pair in (one, other) for chain in pair.chains]
+        low = self._tree.positions[tips, 1].min() < self._floor + _STANDS * self._height
+        if not (apart and low and self._falls(one) and self._are_lifted_legs(other, one)):
+            return None
+        return self._on_four(one, other)
+
+    def _falls(self, legs: LimbPair) -> bool:
+        """Whether a pair of limbs leads down, at the mean of both."""
+        falls = [self._place(chain[0])[1] - self._place(chain[-1])[1] for chain in legs.chains]
+        return bool(np.mean(falls) > _FALLS * self.length(legs))
 
     def _balanced(self, legs: Sequence[LimbPair]) -> bool:
         """Whether legs, or their feet, carry the middle of the body."""

@@ -43,17 +43,20 @@ class RigBuilder:
     def drive_of(self, limbs: Iterable[Limb], least_upright: float) -> str:
         """How a pair of limbs is driven: relative if it stands on the floor, and bends at rest.
 
-        Legs that lie on the floor, as of a toy that sits, do not stand: they point.
+        Legs that lie on the floor, as of a toy that sits, do not stand, nor do those of an animal
+        that leaps: they point.
 
         Args:
             limbs: the pair.
             least_upright: cosine of the angle to the vertical beyond which a segment leans.
         """
+        pair = list(limbs)
         low = self._rest[:, 1].min() + LOW * np.ptp(self._rest[:, 1])
-        for limb in limbs:
-            whole = (limb.upper[0], (limb.lower or limb.upper)[-1])
-            upright = float(_direction(self._rest, whole) @ _DOWN) > _STANDS
-            stands = upright and self._rest[limb.segments[-1][-1], 1] < low
+        wholes = [(limb.upper[0], (limb.lower or limb.upper)[-1]) for limb in pair]
+        upright = [float(_direction(self._rest, whole) @ _DOWN) for whole in wholes]
+        for limb, own in zip(pair, upright, strict=True):
+            both = min(own, float(np.mean(upright))) > _STANDS
+            stands = both and self._rest[limb.segments[-1][-1], 1] < low
             leans = any(
                 _direction(self._rest, chain) @ _DOWN < least_upright
                 for chain in (limb.upper, limb.lower)

@@ -87,6 +87,19 @@ def test_a_raised_tail_is_no_head() -> None:
     assert_roles(body, planned(body))
 
 
+def test_the_legs_of_an_animal_that_leaps_are_legs() -> None:
+    leap = {
+        **DOG,
+        **both("leg", "hips", [(0.12, 0.5, -0.5), (0.12, 0.3, -0.75), (0.12, 0.25, -0.95)], 0.04),
+        **both("arm", "trunk", [(0.12, 0.5, 0.5), (0.12, 0.25, 0.7), (0.12, 0.25, 0.95)], 0.04),
+    }
+    places = [(-0.12, 0.5, 0.5), (-0.12, 0.2, 0.7), (-0.12, 0.02, 0.85)]
+    body = capsule_body({**leap, "arm.R": ("trunk", places, 0.04)})
+    plan = planned(body)
+    assert_roles(body, plan)
+    assert plan.arm_word == "foreleg"
+
+
 def test_legs_in_mid_step_are_a_pair() -> None:
     step = {
         f"leg.{side}": (
@@ -139,6 +152,7 @@ def test_limbs_begin_outside_the_trunk_and_both_alike() -> None:
 SEEN = {
     "mesh/camel_b.obj": (True, True, True, 90),
     "mesh/cat_dt/cat_reference.obj": (True, True, True, 90),
+    "mesh/cat_dt/cat_000001.obj": (True, True, True, 90),
     "mesh/cat_dt/cat_000011.obj": (True, True, True, 90),
     "mesh/cat_dt/dog_reference.obj": (True, True, True, 90),
     "mesh/cow.off": (True, True, True, 90),

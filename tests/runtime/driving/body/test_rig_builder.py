@@ -28,3 +28,13 @@ def test_legs_turn_from_rest_only_if_they_stand_and_bend(leg, drive: str) -> Non
     places = np.array([TOP, *leg, floor])
     rig = RigBuilder(Tree(np.array([-1, 0, 1, 2, 0]), places), places, 0.0)
     assert rig.drive_of([Limb((1, 2), (2, 3))], LEANS) == drive
+
+
+def test_the_legs_of_an_animal_that_leaps_point_although_one_is_low() -> None:
+    low = [(0.1, 0.4, 0), (0.1, 0.2, 0.15), (0.1, 0.0, 0.35)]
+    ahead = [(-0.1, 0.4, 0), (-0.1, 0.3, 0.3), (-0.1, 0.3, 0.6)]
+    places = np.array([TOP, *low, *ahead])
+    rig = RigBuilder(Tree(np.array([-1, 0, 1, 2, 0, 4, 5]), places), places, 0.0)
+    legs = [Limb((1, 2), (2, 3)), Limb((4, 5), (5, 6))]
+    assert rig.drive_of(legs[:1], LEANS) == RELATIVE
+    assert rig.drive_of(legs, LEANS) == ABSOLUTE
