@@ -13,6 +13,7 @@ from runtime.characters.body_nodes.body_nodes import body_nodes
 from runtime.characters.character import Character
 from runtime.characters.creatures.limbless import plan_of_limbless
 from runtime.characters.creatures.many_legs import plan_of_many_legs
+from runtime.characters.creatures.profile import plan_of_profile
 from runtime.characters.plan_by_shape import plan_by_shape
 from solvers.skeleton.limbs import surface_points
 from solvers.skeleton.mirror_plane import SYMMETRIC, MirrorPlane, mirror_planes
@@ -40,6 +41,7 @@ def with_body_by_shape(character: Character) -> Character:
     if plan is None or character.weights is not None:
         plan = plan or plan_of_many_legs(*surface, skeleton.tree, planes)
         plan = plan or plan_of_limbless(*surface, skeleton.tree)
+        plan = plan or plan_of_profile(*surface, skeleton.tree)
         return replace(character, skeleton=skeleton, plan=plan)
     body = body_nodes(
         character.vertices,

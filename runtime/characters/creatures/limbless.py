@@ -34,7 +34,7 @@ def plan_of_limbless(vertices: Array, faces: NDArray[np.int64], tree: Tree) -> B
         faces: (F, 3) into `vertices`.
         tree: the skeleton's nodes at rest [m].
     """
-    spine = _longest(tree)
+    spine = longest_path(tree)
     length = tree.length(spine)
     if len(spine) < _FEWEST or not length > 0.0 or _has_limbs(tree, spine, _SPUR * length):
         return None
@@ -47,12 +47,12 @@ def plan_of_limbless(vertices: Array, faces: NDArray[np.int64], tree: Tree) -> B
     if stands:
         spine = spine if tree.positions[spine[0], 1] < tree.positions[spine[-1], 1] else spine[::-1]
         return _divided(tree, spine, _STANDING)
-    if _headness(tree, spine, nearest, radius) < 0.0:
+    if headness(tree, spine, nearest, radius) < 0.0:
         spine = spine[::-1]
     return _divided(tree, spine, _LYING)
 
 
-def _longest(tree: Tree) -> Chain:
+def longest_path(tree: Tree) -> Chain:
     """The longest path between two leaves."""
     one = max(tree.leaves, key=lambda leaf: tree.length(tree.chain(tree.root, leaf)))
     other = max(tree.leaves, key=lambda leaf: tree.length(tree.chain(one, leaf)))
@@ -71,7 +71,7 @@ def _has_limbs(tree: Tree, spine: Chain, least: float) -> bool:
     return False
 
 
-def _headness(tree: Tree, spine: Chain, nearest: NDArray[np.int64], radius: Array) -> float:
+def headness(tree: Tree, spine: Chain, nearest: NDArray[np.int64], radius: Array) -> float:
     """How much more the last end of a spine looks like a head than the first; 0 for a tie."""
     shares = _shares(tree, spine)
     thick, forked = [], []

@@ -338,9 +338,13 @@ def _two_bodies(pairing: Pairing) -> tuple[TwoBodies, float]:
 
 
 def _hips_that_lead(bodies: TwoBodies) -> list[int]:
-    """The performer's hips, if both lead a body that has no limbs; it goes where they go."""
+    """The performer's hips, if both lead a body without pairs of limbs; it goes where they go."""
     legs, plan = bodies.source.legs, bodies.plan
-    if plan.legs or plan.arms or len(legs) < len(SIDES) or not bodies.trunk_drives:
+    if (
+        len(SIDES) in (len(plan.legs), len(plan.arms))
+        or len(legs) < len(SIDES)
+        or not bodies.trunk_drives
+    ):
         return []
     return [legs[side].upper[0] for side in SIDES]
 
