@@ -9,7 +9,9 @@ Source: Mahmood et al. 2019, "AMASS"; Loper et al. 2015, "SMPL", for the order o
 
 from __future__ import annotations
 
+import struct
 import zipfile
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -27,6 +29,17 @@ from solvers.skeleton.quaternions import followed_by, rotate
 Array = NDArray[np.float64]
 
 MOST_BYTES = 512 << 20  # of all arrays, unpacked
+_DAMAGED = (
+    OSError,
+    ValueError,
+    TypeError,
+    KeyError,
+    EOFError,
+    RuntimeError,  # encrypted, or compressed in a way that is not known
+    zipfile.BadZipFile,
+    zlib.error,
+    struct.error,
+)
 _USUAL_RATE = 30.0
 _RATES = ("mocap_framerate", "mocap_frame_rate", "fps", "frame_rate")
 _CENTRE = (
@@ -75,7 +88,7 @@ def recognises_smpl(path: Path, head: bytes) -> bool:
     try:
         with zipfile.ZipFile(path) as archive:
             names = set(archive.namelist())
-    except (OSError, zipfile.BadZipFile):
+    except _DAMAGED:
         return False
     return "poses.npy" in names or {"root_orient.npy", "pose_body.npy"} <= names
 
@@ -97,7 +110,7 @@ def read_smpl(path: Path, stated: Stated = UNSTATED) -> Recording:
         with np.load(path, allow_pickle=False) as arrays:
             vectors, way = _parameters({name: arrays[name] for name in _wanted(arrays.files)})
             rate = next((float(arrays[name]) for name in _RATES if name in arrays.files), 0.0)
-    except (OSError, ValueError, TypeError, KeyError, EOFError, zipfile.BadZipFile) as error:
+    except _DAMAGED as error:
         raise InputError(
             f"{path}: its arrays are not those of an SMPL body ({type(error).__name__})"
         ) from error

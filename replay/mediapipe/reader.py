@@ -108,7 +108,8 @@ def _world(tracks: Mapping[str, Array], size: tuple[int, int]) -> dict[str, Arra
     factors = np.array([1.0, 1.0, 1.0 / width, 1.0])
     if len(shoulders) == 2:
         apart = np.linalg.norm((shoulders[0] - shoulders[1])[:, :2], axis=1)
-        if (apart[np.isfinite(apart)] > WORLD_WIDEST).mean() > 0.5 if len(apart) else False:
+        apart = apart[np.isfinite(apart)]
+        if 2 * np.count_nonzero(apart > WORLD_WIDEST) > len(apart):
             factors = np.array([1.0 / width, 1.0 / height, 1.0 / width, 1.0])
     return {name: found * factors for name, found in tracks.items()}
 

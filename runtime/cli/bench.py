@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from devices.errors import InputError
-from runtime.cli.options.arguments import positive
+from runtime.cli.options.arguments import counting, positive
 from runtime.show.settings import DRIVES
 
 HELP = "measure the speed of this machine"
 
 DEFAULT = ("arap", "table1", "hold", "dense", "tick", "match", "spacetime")
-LONG = ("clips", "likeness", "soak", "kill", "latency")  # only when named
+LONG = ("clips", "likeness", "soak", "kill", "latency", "fuzz")  # only when named
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         nargs="?",
         metavar="NAME",
         help="arap, table1, hold, dense, tick, match or spacetime (default: all of these); or "
-        "clips, likeness, soak, kill or latency, which take long",
+        "clips, likeness, soak, kill, latency or fuzz, which take long",
     )
     parser.add_argument(
         "--seconds", type=positive, metavar="N", help="soak: seconds of show (default 3600)"
@@ -41,13 +41,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         type=Path,
         metavar="FILE",
-        help="clips, likeness: play this recording, not a built-in one; may be repeated",
+        help="clips, likeness: play this recording, not a built-in one; fuzz: damage it too; may "
+        "be repeated",
     )
     parser.add_argument(
         "--character",
         action="append",
         metavar="C",
-        help="clips, likeness: use this character, not the built-in ones; may be repeated",
+        help="clips, likeness: use this character, not the built-in ones; fuzz: damage it too; may "
+        "be repeated",
     )
     parser.add_argument(
         "--drive", choices=DRIVES, help="likeness: how the characters follow (default auto)"
@@ -57,6 +59,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="DIR",
         help="likeness: draw moments of each pair into a picture in this folder",
+    )
+    parser.add_argument(
+        "--inputs", type=counting, metavar="N", help="fuzz: damaged inputs (default 200000)"
+    )
+    parser.add_argument(
+        "--seed", type=int, metavar="N", help="fuzz: another seed damages otherwise (default 0)"
     )
     parser.add_argument(
         "--json", type=Path, metavar="FILE", help="also write the figures to this file"
@@ -88,8 +96,10 @@ def _arguments(options: argparse.Namespace) -> dict[str, Any]:
         "seconds": (options.seconds, ("soak",)),
         "real_time": (options.real_time or None, ("soak",)),
         "load": (options.load or None, ("latency",)),
-        "recording": (options.recording, ("clips", "likeness")),
-        "character": (options.character, ("clips", "likeness")),
+        "recording": (options.recording, ("clips", "likeness", "fuzz")),
+        "character": (options.character, ("clips", "likeness", "fuzz")),
+        "inputs": (options.inputs, ("fuzz",)),
+        "seed": (options.seed, ("fuzz",)),
         "drive": (options.drive, ("likeness",)),
         "sheets": (options.sheets, ("likeness",)),
     }
