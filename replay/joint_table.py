@@ -11,7 +11,7 @@ from __future__ import annotations
 import csv
 import io
 import re
-import warnings
+from itertools import chain
 from pathlib import Path
 from typing import TextIO
 
@@ -120,9 +120,9 @@ def _parsed(path: Path) -> tuple[Skeleton, Array, tuple[str, ...]]:
             with path.open(encoding="utf-8-sig", errors="replace") as file:
                 skeleton = decode_skeleton(file.readline().removeprefix(MARK).rstrip(",;\n"))
                 file.readline()
-                with warnings.catch_warnings():
-                    warnings.simplefilter("ignore", UserWarning)  # no rows: reported below
-                    rows = np.loadtxt(file, delimiter=",", ndmin=2)
+                first = next((line for line in file if line.strip()), "")
+                lines = chain([first], file)
+                rows = np.loadtxt(lines, delimiter=",", ndmin=2) if first else np.empty((0, 3))
         else:
             skeleton, rows = _from_spreadsheet(file_text(path, MOST_SHEET_BYTES))
             notes = ("saved by a spreadsheet, which may have rounded numbers",)

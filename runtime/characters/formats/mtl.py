@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import re
-import warnings
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image, UnidentifiedImageError
 
 from replay.text_file import without_mark
 from runtime.characters.character import Material
 from runtime.characters.formats.beside import beside
+from runtime.characters.formats.mesh_data import MeshError
+from runtime.characters.formats.pictures import MOST_PIXELS, Texels, PictureSizeError, decoded
 from runtime.characters.palette import linear_from_srgb
 
-_FORMATS = ("PNG", "JPEG", "WEBP")  # Pillow's other decoders are less tested; EPS runs a program
 _WORDS = r"-(?:blend[uv]|boost|mm|[ost]|texres|clamp|bm|imfchan|type|cc|colorspace)"
 _VALUE = r"on|off|sphere|cube_\w+|[rgbmlz]|\w*RGB|auto|-?[\d.,]+(?:e[-+]?\d+)?"
 _VALUES = rf"(?:\s+(?:{_VALUE})(?=\s|$)){{0,3}}"
@@ -23,12 +22,11 @@ _OPTIONS_BEFORE = re.compile(rf"^(?:\s*{_WORDS}{_VALUES}\s+)+", re.IGNORECASE)
 _OPTIONS_BEHIND = re.compile(rf"(?:\s+{_WORDS}{_VALUES})+\s*$", re.IGNORECASE)
 MOST_BYTES = 4 << 20
 MOST_TEXTURE_BYTES = 256 << 20
-MOST_TEXELS = 8192 * 8192
 TEXTURE_SIZE = 2048
 """Greatest number of texels on the longer side; larger textures are reduced."""
 
 
-def read_mtl(path: Path) -> tuple[dict[str, Material], list[str]]:
+def read_mtl(path: Path, textures: Textures) -> tuple[dict[str, Material], list[str]]:
     """Return the materials by name, and notes; a missing or damaged library gives none.
 
     `Kd` is taken as sRGB and replaced by white under a `map_Kd`, which most exporters mean. A name
@@ -51,8 +49,8 @@ def read_mtl(path: Path) -> tuple[dict[str, Material], list[str]]:
     for name, said in settings.items():
         texture = None
         if "map_Kd" in said:
-            texture, note = _texture(path.parent, said["map_Kd"])
-            notes += [note] if note else []
+            texture, note = textures.named(path.parent, said["map_Kd"])
+            notes += [note] if note and note not in notes else []
         materials[name] = Material(_color(said, textured=texture is not None), texture)
     return materials, notes
 
@@ -89,37 +87,44 @@ def _numbers(text: str) -> list[float]:
     return values if np.isfinite(values).all() else []
 
 
-def _texture(folder: Path, value: str) -> tuple[NDArray[np.uint8] | None, str]:
-    """The picture (h, w, 4) that a `map_Kd` line names, and a note where there is none."""
-    name = _without_options(value)
-    fault = ""
-    try:
-        path = beside(folder, value) or beside(folder, name)
-        if path is not None and path.stat().st_size > MOST_TEXTURE_BYTES:
-            fault = "is too large: left out"
-        elif path is not None:
-            return _picture(path), ""
-        else:
-            outside = not (folder / name).resolve().is_relative_to(folder.resolve())
-            fault = "is outside the character's folder" if outside else "is not there"
-            fault += ": default colours"
-    except Image.DecompressionBombError:
-        fault = "is too large: left out"
-    except (OSError, ValueError, SyntaxError, UnidentifiedImageError):
-        fault = "is no PNG, JPEG or WebP, or is damaged: default colours"
-    return None, f"texture {Path(name).name!r} {fault}"
+class Textures:
+    """The textures of one OBJ: each file is decoded once, all within a budget of pixels."""
+
+    def __init__(self) -> None:
+        self._left = MOST_PIXELS
+        self._read: dict[Path, tuple[Texels | None, str]] = {}
+
+    def named(self, folder: Path, value: str) -> tuple[Texels | None, str]:
+        """The picture (h, w, 4) that a `map_Kd` line in `folder` names, and a note if none."""
+        name = _without_options(value)
+        try:
+            path = beside(folder, value) or beside(folder, name)
+            if path is not None and path not in self._read:
+                self._read[path] = self._decoded(path)
+            texture, fault = (None, _absence(folder, name)) if path is None else self._read[path]
+        except (OSError, ValueError):  # a name that no file can have
+            texture, fault = None, "is not there: default colours"
+        return texture, f"texture {Path(name).name!r} {fault}" if fault else ""
+
+    def _decoded(self, path: Path) -> tuple[Texels | None, str]:
+        if path.stat().st_size > MOST_TEXTURE_BYTES:
+            return None, "is too large: left out"
+        try:
+            texture, pixels = decoded(path.read_bytes(), self._left, TEXTURE_SIZE)
+        except PictureSizeError:
+            return None, "is too large: left out"
+        except (OSError, MeshError):
+            return None, "is no PNG, JPEG or WebP, or is damaged: default colours"
+        self._left -= pixels
+        return texture, ""
+
+
+def _absence(folder: Path, name: str) -> str:
+    outside = not (folder / name).resolve().is_relative_to(folder.resolve())
+    what = "is outside the character's folder" if outside else "is not there"
+    return f"{what}: default colours"
 
 
 def _without_options(value: str) -> str:
     """The name of a texture without the options before and, in some programs, behind it."""
     return _OPTIONS_BEHIND.sub("", _OPTIONS_BEFORE.sub("", value)).strip().replace("\\", "/")
-
-
-def _picture(path: Path) -> NDArray[np.uint8]:
-    """The picture (h, w, 4) in a file, no larger than `TEXTURE_SIZE`."""
-    with warnings.catch_warnings(), Image.open(path, formats=_FORMATS) as image:
-        warnings.simplefilter("ignore")
-        if image.width * image.height > MOST_TEXELS:
-            raise Image.DecompressionBombError
-        image.thumbnail((TEXTURE_SIZE, TEXTURE_SIZE))
-        return np.array(image.convert("RGBA"), dtype=np.uint8)

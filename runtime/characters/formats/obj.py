@@ -17,7 +17,7 @@ from runtime.characters.formats.mesh_data import (
     check_counts,
     plain_material,
 )
-from runtime.characters.formats.mtl import read_mtl
+from runtime.characters.formats.mtl import Textures, read_mtl
 from runtime.characters.formats.obj_lines import ObjContent, parse_obj
 from runtime.characters.formats.polygons import cut_polygons
 from runtime.characters.palette import linear_from_srgb
@@ -73,8 +73,9 @@ def _materials(read: ObjContent, folder: Path) -> tuple[tuple[Material, ...], li
     """
     library: dict[str, Material] = {}
     notes: list[str] = []
+    textures = Textures()
     for path in _library_files(read.libraries, folder):
-        found, said = read_mtl(path)
+        found, said = read_mtl(path, textures)
         library |= found
         notes += said
     uncommented = {_uncommented(name): material for name, material in library.items()}

@@ -2,24 +2,14 @@
 
 from __future__ import annotations
 
-import io
-import struct
-import warnings
-import zlib
-
 import numpy as np
 from numpy.typing import NDArray
-from PIL import Image
 
 from runtime.characters.character import Material
 from runtime.characters.formats.mesh_data import MeshError, plain_material
+from runtime.characters.formats.pictures import MOST_PIXELS, Texels, decoded
 from runtime.characters.gltf.checked_json import Entry
 from runtime.characters.gltf.file import GltfFile
-
-MOST_PIXELS = 64 * 1024 * 1024
-"""All textures of a file together have at most as many pixels."""
-
-Texels = NDArray[np.uint8]
 
 
 class MaterialReader:
@@ -78,11 +68,11 @@ class MaterialReader:
                 content = bytes(self._file.view(entry.whole("bufferView")))
             else:
                 content = self._file.uri_content(entry.text("uri", ""))
-            texels = decoded(content, MOST_PIXELS - self._pixels)
+            texels, pixels = decoded(content, MOST_PIXELS - self._pixels)
         except MeshError as error:
             self.notes.append(f"texture {name!r} is left out: {error}")
             return None
-        self._pixels += texels.shape[0] * texels.shape[1]
+        self._pixels += pixels
         return texels
 
 
@@ -92,35 +82,6 @@ def base(material: Entry) -> tuple[Entry | None, str, str]:
     if glossy is not None:
         return glossy, "diffuseFactor", "diffuseTexture"
     return material.child("pbrMetallicRoughness"), "baseColorFactor", "baseColorTexture"
-
-
-def decoded(content: bytes, most: int) -> Texels:
-    """Decode a PNG, JPEG or WebP image of at most `most` pixels to (h, w, 4) uint8 sRGB.
-
-    Raises:
-        MeshError: it has another format, is damaged, or is larger.
-    """
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # the size is checked here, before a pixel is decoded
-            image = Image.open(io.BytesIO(content), formats=("PNG", "JPEG", "WEBP"))
-            if image.width * image.height > most:
-                raise MeshError(f"{image.width} x {image.height} pixels are too many")
-            return np.asarray(image.convert("RGBA"), dtype=np.uint8)
-    except MeshError:
-        raise
-    except (
-        OSError,
-        ValueError,
-        SyntaxError,
-        EOFError,
-        IndexError,
-        OverflowError,
-        struct.error,
-        zlib.error,
-        Image.DecompressionBombError,
-    ):
-        raise MeshError("its image is damaged or not PNG, JPEG or WebP") from None
 
 
 def texture_coordinates(file: GltfFile, material: int | None) -> tuple[str, NDArray[np.float64]]:
