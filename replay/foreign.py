@@ -9,9 +9,6 @@ _MARKERS = "fit a skeleton to its markers where they were captured (Motive, Vico
 _HINTS = {
     ".fbx": ("FBX", _BLENDER_BVH),
     ".dae": ("COLLADA", _BLENDER_BVH),
-    ".glb": ("glTF animation", _BLENDER_BVH),
-    ".gltf": ("glTF animation", _BLENDER_BVH),
-    ".vrma": ("VRM animation", "open it in Blender with the VRM add-on and export BVH"),
     ".blend": ("Blender file", "open it in Blender and export BVH (File, Export, Motion Capture)"),
     ".vmd": ("MikuMikuDance motion", "open it in Blender with mmd_tools and export BVH"),
     ".c3d": ("C3D markers", _MARKERS),
@@ -31,7 +28,6 @@ _HINTS = {
 _STARTS = (
     (b"Kaydara FBX Binary", ".fbx"),
     (b"; FBX", ".fbx"),
-    (b"glTF", ".glb"),
     (b"Vocaloid Motion Data", ".vmd"),
     (b"PathFileType", ".trc"),
     (b"# AST/ASF", ".asf"),

@@ -8,10 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from devices.errors import InputError
+from devices.errors import ContentError, InputError
 from replay.bounds import check_recordable, plausible
 from replay.bvh.reader import read_bvh, recognises_bvh
 from replay.foreign import conversion_hint
+from replay.gltf.reader import read_gltf_animation, recognises_gltf
 from replay.joint_table import read_joint_table, recognises_joint_table
 from replay.kinect.azure_csv import read_azure_csv, recognises_azure_csv
 from replay.kinect.azure_json import read_azure_json, recognises_azure_json
@@ -24,8 +25,8 @@ from replay.leap.reader import read_leap, recognises_leap
 from replay.mcap.reader import read_mcap, recognises_mcap
 from replay.mediapipe.reader import read_mediapipe, recognises_mediapipe
 from replay.recording import Recording
-from replay.smpl import read_smpl, recognises_smpl
 from replay.stated import UNSTATED, Stated
+from replay.studio.smpl import read_smpl, recognises_smpl
 from replay.text_file import decoded, without_mark
 
 HEAD_BYTES = 4096
@@ -45,7 +46,7 @@ class RecordingFormat:
         recognises: whether a file has this format, from its path and first bytes, in UTF-8 where
             it is text.
         reader: reads the file, and takes what is stated of its unit and axes; raises InputError
-            that names the file and the fault.
+            that names the file and the fault, or ContentError that names the fault.
     """
 
     name: str
@@ -60,7 +61,10 @@ class RecordingFormat:
             InputError: it is not a file, is damaged, or leaves nothing open that is stated.
         """
         check_recordable(path)
-        recording = self.reader(path, stated)
+        try:
+            recording = self.reader(path, stated)
+        except ContentError as error:
+            raise InputError(f"{path}: {error}") from None
         try:
             return stated.applied(plausible(recording))
         except InputError as error:
@@ -85,6 +89,7 @@ def formats() -> tuple[RecordingFormat, ...]:
     """Return every readable format, the most certain to recognise first."""
     return (
         RecordingFormat("Bunraku recording (MCAP)", recognises_mcap, _certain(read_mcap)),
+        RecordingFormat("glTF animation (GLB, VRMA)", recognises_gltf, read_gltf_animation),
         RecordingFormat("Bunraku table (CSV)", recognises_joint_table, _certain(read_joint_table)),
         RecordingFormat("Leap Motion messages", recognises_leap, _certain(read_leap)),
         RecordingFormat(

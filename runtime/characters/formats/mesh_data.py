@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from devices.errors import ContentError
 from runtime.characters.character import Material
 
 MOST_VERTICES = 2_000_000
@@ -20,7 +21,7 @@ def plain_material() -> Material:
     return Material(np.ones(4, dtype=np.float32))
 
 
-class MeshError(ValueError):
+class MeshError(ContentError):
     """A fault in the content of a mesh file; `read_mesh_file` adds the file's name."""
 
 

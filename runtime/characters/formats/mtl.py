@@ -12,7 +12,7 @@ from replay.text_file import without_mark
 from runtime.characters.character import Material
 from runtime.characters.formats.beside import beside
 from runtime.characters.formats.mesh_data import MeshError
-from runtime.characters.formats.pictures import MOST_PIXELS, Texels, PictureSizeError, decoded
+from runtime.characters.formats.pictures import MOST_PIXELS, PictureSizeError, Texels, decoded
 from runtime.characters.palette import linear_from_srgb
 
 _WORDS = r"-(?:blend[uv]|boost|mm|[ost]|texres|clamp|bm|imfchan|type|cc|colorspace)"

@@ -7,9 +7,9 @@ Source: VRM Consortium, "VRM 0.x: blendshape" and "VRMC_vrm 1.0: expressions".
 
 from __future__ import annotations
 
-from runtime.characters.formats.mesh_data import MeshError
-from runtime.characters.gltf.checked_json import Entry
-from runtime.characters.gltf.file import GltfFile
+from devices.errors import ContentError
+from replay.gltf.checked_json import Entry
+from replay.gltf.file import GltfFile
 from runtime.characters.gltf.morphs import LONGEST_NAME, MorphReader
 from runtime.characters.morphs import BLEND, BLOCK, NONE, Expression
 
@@ -32,7 +32,7 @@ def read_expressions(
             found = _of_vrm_1(file, new, morphs)
         else:
             found = [] if old is None else _of_vrm_0(old, morphs)
-    except MeshError as error:
+    except ContentError as error:
         return (), (f"its expressions are left out: {error}",)
     if len(found) > MOST_EXPRESSIONS:
         return (), (f"its {len(found)} expressions are left out: more than {MOST_EXPRESSIONS}",)

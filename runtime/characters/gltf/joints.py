@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.skeleton import Skeleton
-from runtime.characters.gltf.scene import Scene
+from replay.gltf.scene import Scene
 
 Array = NDArray[np.float64]
 _COINCIDENT = 1e-4

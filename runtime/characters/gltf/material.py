@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from devices.errors import ContentError
+from replay.gltf.checked_json import Entry
+from replay.gltf.file import GltfFile
 from runtime.characters.character import Material
-from runtime.characters.formats.mesh_data import MeshError, plain_material
+from runtime.characters.formats.mesh_data import plain_material
 from runtime.characters.formats.pictures import MOST_PIXELS, Texels, decoded
-from runtime.characters.gltf.checked_json import Entry
-from runtime.characters.gltf.file import GltfFile
 
 
 class MaterialReader:
@@ -69,7 +70,7 @@ class MaterialReader:
             else:
                 content = self._file.uri_content(entry.text("uri", ""))
             texels, pixels = decoded(content, MOST_PIXELS - self._pixels)
-        except MeshError as error:
+        except ContentError as error:
             self.notes.append(f"texture {name!r} is left out: {error}")
             return None
         self._pixels += pixels

@@ -11,12 +11,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
 
+from replay.gltf.checked_json import Entry
+from replay.gltf.file import COMPRESSIONS, GltfFile, compressed
+from replay.gltf.scene import MOST_NODES, Scene
 from runtime.characters.formats.mesh_data import MOST_FACES, MOST_VERTICES, MeshError
-from runtime.characters.gltf.checked_json import Entry
-from runtime.characters.gltf.file import COMPRESSIONS, GltfFile, compressed
 from runtime.characters.gltf.material import MaterialReader, texture_coordinates
 from runtime.characters.gltf.morphs import MorphReader, PartMorph, shaped
-from runtime.characters.gltf.scene import MOST_NODES, Scene
 
 Array = NDArray[np.float64]
 _SEVERAL = ("VEC4", "VEC3", "VEC2", "SCALAR")  # joints of a vertex; glTF allows only four

@@ -14,9 +14,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from devices.errors import ContentError
+from replay.gltf.checked_json import Entry
+from replay.gltf.file import GltfFile
 from runtime.characters.formats.mesh_data import MeshError
-from runtime.characters.gltf.checked_json import Entry
-from runtime.characters.gltf.file import GltfFile
 
 Array = NDArray[np.float64]
 
@@ -74,7 +75,7 @@ class MorphReader:
         """
         try:
             return self._targets(mesh, primitive, positions, to_scene)
-        except MeshError as error:
+        except ContentError as error:
             self.notes.append(f"morph targets are left out: {error}")
             return ()
 
@@ -146,7 +147,7 @@ def shaped(
                 raise target.wrong("its deltas do not fit the vertices")
             positions = positions + weight * deltas
             file.notes["default weights of morph targets shape the surface at rest"] = None
-    except MeshError as error:
+    except ContentError as error:
         file.notes[f"default weights of morph targets are left out: {error}"] = None
     return positions
 

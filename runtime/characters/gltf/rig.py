@@ -11,18 +11,19 @@ from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array, vstack
 from scipy.spatial import cKDTree
 
-from devices.errors import InputError
+from devices.errors import ContentError, InputError
 from devices.skeleton import Skeleton
+from replay.gltf.file import GltfFile
+from replay.gltf.humanoid import humanoid_bones
+from replay.gltf.scene import Scene, read_scene
 from runtime.characters.character import Material
 from runtime.characters.formats.mesh_data import MeshError, plain_material
+from runtime.characters.formats.mesh_file import file_content
 from runtime.characters.gltf.expressions import read_expressions
-from runtime.characters.gltf.file import GltfFile
-from runtime.characters.gltf.humanoid import humanoid_bones
 from runtime.characters.gltf.joints import Rig, build_rig, with_connections
 from runtime.characters.gltf.material import MaterialReader
 from runtime.characters.gltf.mesh import MeshPart, read_parts
 from runtime.characters.gltf.morphs import MorphReader
-from runtime.characters.gltf.scene import Scene, read_scene
 from runtime.characters.morphs import Expression
 from runtime.characters.rig_body import body_around
 
@@ -76,12 +77,12 @@ def read_gltf(path: Path) -> GltfModel:
     """
     try:
         return _read(path)
-    except MeshError as error:
+    except ContentError as error:
         raise InputError(f"{path}: {error}") from None
 
 
 def _read(path: Path) -> GltfModel:
-    file = GltfFile(path)
+    file = GltfFile(file_content(path), path.parent)
     scene = read_scene(file)
     look, morphs = MaterialReader(file), MorphReader(file)
     parts, notes = read_parts(file, scene, look, morphs)
@@ -152,7 +153,7 @@ def _declared(file: GltfFile) -> tuple[dict[str, int], tuple[str, ...]]:
     """
     try:
         return humanoid_bones(file), ()
-    except MeshError as error:
+    except ContentError as error:
         return {}, (f"its humanoid bones are left out: {error}",)
 
 

@@ -16,6 +16,7 @@ from scipy.sparse import csr_array
 from scipy.spatial.transform import Rotation, Slerp
 
 from devices.errors import InputError
+from replay.formats import read_recording
 from runtime.characters.character import Character
 from runtime.characters.morphs import Morphs
 from runtime.driving.targets import PosedNodes
@@ -185,6 +186,21 @@ def test_the_nodes_are_exactly_where_they_were(tmp_path: Path) -> None:
         np.testing.assert_allclose(matrices[:, :3, 3], frame.nodes.positions, atol=1e-5)
         turns = Rotation.from_quat(frame.nodes.rotations).as_matrix()
         np.testing.assert_allclose(matrices[:, :3, :3], turns, atol=1e-5)
+
+
+def test_what_is_exported_plays_back(tmp_path: Path) -> None:
+    character = make_tentacle()
+    show = make_show(character)
+    export(tmp_path / "a.glb", character, show)
+    recording = read_recording(tmp_path / "a.glb")
+    places = [recording.skeleton.index(name) for name in character.skeleton.names]
+    assert len(recording) == len(show)
+    assert recording.times[-1] == pytest.approx(show[-1].time - show[0].time, abs=1e-5)
+    expected = np.array([frame.nodes.positions for frame in show])
+    played = recording.positions[:, places]
+    np.testing.assert_allclose(
+        played - played[:1, :1], expected - expected[:1, :1], atol=1e-5 * HEIGHT
+    )
 
 
 def test_weights_of_the_file_are_kept(tmp_path: Path) -> None:

@@ -15,10 +15,10 @@ from urllib.parse import unquote, unquote_to_bytes
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.errors import InputError
-from runtime.characters.formats.mesh_data import MOST_FACES, MeshError
-from runtime.characters.formats.mesh_file import file_content
-from runtime.characters.gltf.checked_json import Entry, parse_document
+from devices.errors import ContentError, InputError
+from replay.bounds import check_recordable
+from replay.gltf.checked_json import Entry, parse_document
+from replay.text_file import file_bytes
 
 COMPRESSIONS = (
     "KHR_draco_mesh_compression",
@@ -26,7 +26,10 @@ COMPRESSIONS = (
     "KHR_meshopt_compression",
 )
 _STANDARD = str.maketrans("-_", "+/")  # of the alphabet for addresses
-_MOST_ELEMENTS = 3 * MOST_FACES
+MOST_BYTES = 1 << 30
+"""Of the file, and of each that it names."""
+
+_MOST_ELEMENTS = 12_000_000
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 _COMPONENTS = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 
@@ -40,15 +43,13 @@ class GltfFile:
         notes: repairs of the file, one short line each, each once.
     """
 
-    def __init__(self, path: Path) -> None:
-        """Read `path`.
+    def __init__(self, content: bytes, folder: Path) -> None:
+        """Parse a file's content; `folder` is where it lies.
 
         Raises:
-            InputError: it cannot be read.
-            MeshError: it is no glTF 2 document, or its geometry is compressed.
+            ContentError: it is no glTF 2 document, or its geometry is compressed.
         """
-        self.folder = path.parent
-        content = file_content(path)
+        self.folder = folder
         text, self._binary = _chunks(content) if content[:4] == b"glTF" else (content, None)
         self.document = parse_document(text)
         for name in self.document.texts("extensionsRequired"):
@@ -68,31 +69,32 @@ class GltfFile:
         """The entry of a kind with an index.
 
         Raises:
-            MeshError: it does not exist.
+            ContentError: it does not exist.
         """
         entries = self.entries(kind)
         if index >= len(entries):
-            raise MeshError(f"{kind} {index} is named but not there; export the model again")
+            raise ContentError(f"{kind} {index} is named but not there; export the model again")
         return entries[index]
 
     def uri_content(self, uri: str) -> bytes:
         """The bytes of a data URI, or of the file that a relative URI names, in this file's folder.
 
         Raises:
-            MeshError: the URI leaves the folder, is damaged, or the file cannot be read.
+            ContentError: the URI leaves the folder, is damaged, or the file cannot be read.
         """
         if uri[:5].lower() == "data:":
             return _data(uri)
         name = unquote(uri).replace("\\", "/")
         inside = Path(name)
         if not name.isprintable() or ":" in name or inside.is_absolute() or ".." in inside.parts:
-            raise MeshError(
+            raise ContentError(
                 f"it names {name[:60]!r}, which is not beside it; put the file into its folder"
             )
         try:
-            return file_content(self.folder / inside)
+            check_recordable(self.folder / inside)
+            return file_bytes(self.folder / inside, MOST_BYTES)
         except InputError:
-            raise MeshError(
+            raise ContentError(
                 f"it needs {name[:60]!r}, which cannot be read; put that file beside it"
             ) from None
 
@@ -206,7 +208,7 @@ def _data(uri: str) -> bytes:
     """The bytes of a data URI; base64 may be wrapped, percent-encoded or without its padding.
 
     Raises:
-        MeshError: it is damaged.
+        ContentError: it is damaged.
     """
     head, _, body = uri.partition(",")
     if not head.replace(" ", "").lower().endswith(";base64"):
@@ -215,32 +217,32 @@ def _data(uri: str) -> bytes:
     try:
         return base64.b64decode(coded + "=" * (-len(coded) % 4), validate=True)
     except (binascii.Error, ValueError):
-        raise MeshError("a data URI is damaged; export the model again") from None
+        raise ContentError("a data URI is damaged; export the model again") from None
 
 
-def compressed(name: str) -> MeshError:
+def compressed(name: str) -> ContentError:
     """The error for geometry compressed by the extension called `name`."""
-    return MeshError(f"its geometry is compressed ({name}); export it without compression")
+    return ContentError(f"its geometry is compressed ({name}); export it without compression")
 
 
 def _chunks(content: bytes) -> tuple[bytes, bytes | None]:
     """The JSON and the binary chunk of a GLB file."""
     if len(content) < 20:
-        raise MeshError("it is cut short; export or download the model again")
+        raise ContentError("it is cut short; export or download the model again")
     version, length = struct.unpack_from("<II", content, 4)
     if version != 2:
-        raise MeshError(f"is GLB version {version}; export it as glTF 2.0")
+        raise ContentError(f"is GLB version {version}; export it as glTF 2.0")
     if length > len(content):
-        raise MeshError(f"has {len(content)} of {length} bytes; export or download it again")
+        raise ContentError(f"has {len(content)} of {length} bytes; export or download it again")
     chunks: list[tuple[bytes, bytes]] = []
     at = 12
     while at + 8 <= length and len(chunks) < 2:
         size, kind = struct.unpack_from("<I4s", content, at)
         if at + 8 + size > length:
-            raise MeshError("a chunk ends beyond the file; export or download the model again")
+            raise ContentError("a chunk ends beyond the file; export or download the model again")
         chunks.append((kind, content[at + 8 : at + 8 + size]))
         at += 8 + size
     if not chunks or chunks[0][0] != b"JSON":
-        raise MeshError("its first chunk is not JSON; export the model again")
+        raise ContentError("its first chunk is not JSON; export the model again")
     binary = chunks[1][1] if len(chunks) > 1 and chunks[1][0] == b"BIN\0" else None
     return chunks[0][1], binary

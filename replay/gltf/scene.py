@@ -10,9 +10,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from runtime.characters.formats.mesh_data import MeshError
-from runtime.characters.gltf.checked_json import Entry
-from runtime.characters.gltf.file import GltfFile
+from devices.errors import ContentError
+from replay.gltf.checked_json import Entry
+from replay.gltf.file import GltfFile
 
 MOST_NODES = 30_000
 MOST_DEPTH = 1_000
@@ -51,11 +51,11 @@ def read_scene(file: GltfFile) -> Scene:
     """Read the node tree.
 
     Raises:
-        MeshError: it is no forest, or a transform is not finite.
+        ContentError: it is no forest, or a transform is not finite.
     """
     nodes = _with_lone_meshes(file)
     if len(nodes) > MOST_NODES:
-        raise MeshError(f"it has {len(nodes)} nodes, more than {MOST_NODES}; simplify the scene")
+        raise ContentError(f"it has {len(nodes)} nodes, more than {MOST_NODES}; simplify the scene")
     children = [node.wholes("children", below=len(nodes)) for node in nodes]
     parents = np.full(len(nodes), -1, dtype=np.int64)
     for index, below in enumerate(children):
@@ -66,19 +66,19 @@ def read_scene(file: GltfFile) -> Scene:
     roots = [int(root) for root in np.flatnonzero(parents < 0)]
     order = _depth_first(roots, children)
     if len(order) < len(nodes):
-        raise MeshError("its nodes form a cycle; export the model again")
+        raise ContentError("its nodes form a cycle; export the model again")
     depth = np.zeros(len(nodes), dtype=np.int64)
     for node in order:
         depth[node] = 0 if parents[node] < 0 else depth[parents[node]] + 1
     if len(nodes) and depth.max() > MOST_DEPTH:
-        raise MeshError(f"its nodes nest deeper than {MOST_DEPTH}; simplify the scene")
+        raise ContentError(f"its nodes nest deeper than {MOST_DEPTH}; simplify the scene")
     to_scene = np.empty((len(nodes), 4, 4))
     with np.errstate(all="ignore"):  # overflow is refused below
         for node in order:
             local = local_transform(nodes[node])
             to_scene[node] = local if parents[node] < 0 else to_scene[parents[node]] @ local
     if not (np.abs(to_scene) < 1e15).all():
-        raise MeshError("the transform of a node is beyond all bounds; export the model again")
+        raise ContentError("the transform of a node is beyond all bounds; export the model again")
     drawn = _depth_first(_scene_roots(file, roots), children)
     if not any("mesh" in nodes[node] for node in drawn) and any("mesh" in node for node in nodes):
         file.notes["the default scene draws no mesh: all of the file's are used"] = None

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.bounded_json import parse_json
-from runtime.characters.formats.mesh_data import MeshError
+from devices.errors import ContentError
 
 MOST_ENTRIES = 1_000_000
 """No list of a glTF document is longer."""
@@ -26,7 +26,7 @@ _NO_NUMBER = re.compile(
 class Entry:
     """One JSON object of the document, and its place in it for messages.
 
-    Every getter raises MeshError when the property has another type or range, or when it is
+    Every getter raises ContentError when the property has another type or range, or when it is
     missing and there is no default.
     """
 
@@ -36,9 +36,9 @@ class Entry:
     def __contains__(self, name: str) -> bool:
         return name in self.fields
 
-    def wrong(self, what: str) -> MeshError:
+    def wrong(self, what: str) -> ContentError:
         """Make the error that names this entry and its fault."""
-        return MeshError(f"{self.place}: {what}; export the model again")
+        return ContentError(f"{self.place}: {what}; export the model again")
 
     def whole(self, name: str, default: int | None = None, *, below: int = 1 << 40) -> int:
         """A property that is an integer in [0, below)."""
@@ -131,20 +131,20 @@ def parse_document(content: bytes) -> Entry:
     getter returns them.
 
     Raises:
-        MeshError: it is not JSON, not an object, or not glTF 2.
+        ContentError: it is not JSON, not an object, or not glTF 2.
     """
     try:
         text = content.rstrip(b"\0 \r\n\t").decode("utf-8-sig")
         value = _parsed(text)
     except (ValueError, RecursionError):
-        raise MeshError("its JSON is cut short or damaged; export the model again") from None
+        raise ContentError("its JSON is cut short or damaged; export the model again") from None
     if not isinstance(value, dict):
-        raise MeshError("its JSON is no glTF document; export the model again")
+        raise ContentError("its JSON is no glTF document; export the model again")
     document = Entry(value, "the document")
     asset = document.child("asset")
     version = "" if asset is None else str(asset.fields.get("version", ""))
     if not version.startswith("2"):
-        raise MeshError(f"is glTF version {version[:20] or 'unknown'}; export it as glTF 2.0")
+        raise ContentError(f"is glTF version {version[:20] or 'unknown'}; export it as glTF 2.0")
     return document
 
 

@@ -1,21 +1,22 @@
 """Read which nodes a VRM file declares to be the bones of a humanoid.
 
-Source: VRM Consortium, "VRM 0.x: humanoid" and "VRMC_vrm 1.0: humanoid".
+Source: VRM Consortium, "VRM 0.x: humanoid" and "VRMC_vrm 1.0: humanoid",
+"VRMC_vrm_animation 1.0".
 """
 
 from __future__ import annotations
 
-from runtime.characters.gltf.file import GltfFile
+from replay.gltf.file import GltfFile
 
 
 def humanoid_bones(file: GltfFile) -> dict[str, int]:
     """Return the node of each humanoid bone, by VRM's name for it: "leftUpperArm"; often empty.
 
     Raises:
-        MeshError: the declaration is damaged.
+        ContentError: the declaration is damaged.
     """
     count = len(file.entries("nodes"))
-    new = file.document.extension("VRMC_vrm")
+    new = file.document.extension("VRMC_vrm") or file.document.extension("VRMC_vrm_animation")
     old = file.document.extension("VRM")
     if new is not None:
         humanoid = new.child("humanoid")

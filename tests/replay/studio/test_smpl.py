@@ -11,7 +11,7 @@ import pytest
 from devices.errors import InputError
 from replay.formats import read_recording
 from replay.recording import Recording
-from replay.smpl import NEUTRAL, ORDER
+from replay.studio.smpl import NEUTRAL, ORDER
 
 Z_UP = np.array([np.pi / 2, 0.0, 0.0])  # AMASS's root: +Y of the body to +Z of the room
 

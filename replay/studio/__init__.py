@@ -1,0 +1,1 @@
+"""Readers of what capture studios and laboratories write."""
