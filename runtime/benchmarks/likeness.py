@@ -26,6 +26,7 @@ from runtime.benchmarks.resemblance.ground import ground_figures
 from runtime.benchmarks.resemblance.limbs import FOUR, limb_figures, sides
 from runtime.benchmarks.resemblance.performance import Performance, perform
 from runtime.benchmarks.resemblance.steadiness import jitter
+from runtime.benchmarks.resemblance.tips import tip_figures
 from runtime.benchmarks.resemblance.turns import finger_curl_kept, hand_roll_kept, head_yaw_kept
 from runtime.characters.builtin import BUILTIN
 from runtime.characters.character import Character
@@ -95,6 +96,8 @@ def figures_of(performance: Performance, face: tuple[int, int] | None) -> dict[s
         limbs = limb_figures(performer, character)
         found |= {
             "limbs": {name: asdict(limb) for name, limb in limbs.items()},
+            "tips": _tips(performance),
+            "ends_kept": performance.ends_kept,
             "sides": sides(performer, character),
             "ground": asdict(
                 ground_figures(
@@ -125,6 +128,7 @@ def lines(row: dict[str, Any]) -> Iterator[str]:
                 f"  {name:<16} {_number(limb['error'], 1):>5}° {_number(limb['kept']):>5}"
                 f" {_number(limb['range'], 1):>8}° {_number(limb['gain']):>5}"
             )
+        yield from _tip_lines(row)
         yield from _body_lines(row)
     else:
         yield "  no limbs to compare: a body is not recognised, or its driver poses no nodes"
@@ -179,6 +183,27 @@ def _measure(
     row = {"recording": name, "character": character.name, **figures}
     sheet.write(path, summary(row))
     return figures
+
+
+def _tips(performance: Performance) -> dict[str, dict[str, float]]:
+    performer, character, rest = performance.performer, performance.character, performance.rest
+    if performer is None or character is None or rest is None:
+        return {}
+    heights = performance.stature, performance.height
+    tips = tip_figures(performer, character, rest, heights)
+    return {name: asdict(tip) for name, tip in tips.items()}
+
+
+def _tip_lines(row: dict[str, Any]) -> Iterator[str]:
+    if row["tips"] or row["ends_kept"]:
+        yield f"  {'tip':<16} {'seen':>6} {'up':>5} {'aside':>9} {'volume':>6}"
+    nothing = dict.fromkeys(("seen", "up", "aside"))
+    for name in dict.fromkeys((*row["tips"], *row["ends_kept"])):
+        tip = row["tips"].get(name, nothing)
+        yield (
+            f"  {name:<16} {_number(tip['seen']):>6} {_number(tip['up']):>5}"
+            f" {_number(tip['aside']):>9} {_number(row['ends_kept'].get(name)):>6}"
+        )
 
 
 def _body_lines(row: dict[str, Any]) -> Iterator[str]:

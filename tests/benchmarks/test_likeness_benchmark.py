@@ -74,8 +74,21 @@ def test_the_limbs_of_an_absolute_body_point_as_the_performers(figure: Character
     assert figures["limbs"]["right forearm"]["gain"] == pytest.approx(1.0, abs=0.05)
     assert figures["sides"]["arms"] == "right"
     assert figures["ground"]["hover"] == 0.0
+    assert figures["tips"]["right arm"]["up"] > 0.95
+    assert figures["tips"]["right arm"]["seen"] > 0.5
+    assert all(0.8 < kept < 1.2 for kept in figures["ends_kept"].values())
     printed = "\n".join(lines({"recording": "wave", "character": "figure", **figures}))
-    for word in ("right forearm", "sides", "travel", "slide", "squat", "yaw", "jitter", "tick"):
+    for word in (
+        "right forearm",
+        "volume",
+        "sides",
+        "travel",
+        "slide",
+        "squat",
+        "yaw",
+        "jitter",
+        "tick",
+    ):
         assert word in printed
 
 

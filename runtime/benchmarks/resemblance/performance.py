@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from devices.bodies.plan_by_names import plan_by_names
 from replay.recording import Recording
 from runtime.benchmarks.resemblance.body_track import BodyTrack, off_body
+from runtime.benchmarks.resemblance.limb_ends import LimbEnds
 from runtime.benchmarks.resemblance.steadiness import steps_of_joints
 from runtime.characters.character import Character
 from runtime.puppet.puppet import Motion
@@ -56,6 +57,9 @@ class Performance:
         positions: (T, J, 3) [m] of the performer's joints; NaN for those that are not of the body.
         lowest: (T,) [m] height of the character's lowest vertex.
         height: [m] of the character at rest.
+        stature: [m] of the performer at rest.
+        rest: the character at rest, one frame; None where no body is recognised.
+        ends_kept: the share of its volume that the end of each limb keeps: see `LimbEnds.kept`.
         surface: figures of the surface.
     """
 
@@ -64,6 +68,9 @@ class Performance:
     positions: Array
     lowest: Array
     height: float
+    stature: float
+    rest: BodyTrack | None
+    ends_kept: dict[str, float]
     surface: SurfaceFigures
 
 
@@ -86,11 +93,15 @@ def perform(
     """
     watch = _SurfaceWatch(character)
     motions: list[Motion] = []
+    ends: LimbEnds | None = None
     with Show(play(recording, every_frame=True), [character], settings) as show:
         while not show.ended:
             if show.tick():
                 motion = show.motions[0]
                 watch.add(motion.vertices)
+                ends = ends or _ends(show.puppets[0].character)
+                if ends is not None:
+                    ends.add(motion.vertices)
                 motions.append(Motion(motion.vertices[:0], motion.nodes))
                 then(len(motions) - 1, show)
             show.settle()
@@ -109,6 +120,11 @@ def perform(
         positions=positions,
         lowest=np.array(watch.lowest),
         height=watch.height,
+        stature=float(np.ptp(recording.skeleton.rest_positions[:, 1])),
+        rest=None
+        if driven.plan is None
+        else BodyTrack(np.zeros(1), driven.skeleton.rest_positions[None], None, driven.plan),
+        ends_kept={} if ends is None else ends.kept,
         surface=SurfaceFigures(
             stretch_mean=stretch["mean"],
             stretch_p99=stretch["p99"],
@@ -129,6 +145,12 @@ def _posed(times: Array, character: Character, motions: list[Motion]) -> BodyTra
     positions = np.stack([each.positions for each in nodes])
     rotations = np.stack([each.rotations for each in nodes])
     return BodyTrack(times, positions, rotations, character.plan)
+
+
+def _ends(character: Character) -> LimbEnds | None:
+    if character.plan is None:
+        return None
+    return LimbEnds(character.vertices, character.faces, character.skeleton.tree, character.plan)
 
 
 class _SurfaceWatch:
