@@ -11,12 +11,12 @@ from pathlib import Path
 
 import numpy as np
 from PIL import Image
-from replay.smpl import ORDER
 
 from devices.skeleton import Skeleton, SkeletonFrame
 from replay.joint_table import write_joint_table
 from replay.mcap.writer import McapWriter
 from replay.recording import Recording
+from replay.studio.smpl import ORDER
 
 MAPPING = json.dumps(
     {"pairs": [{"source": ["SpineBase", "SpineMid", "Head"], "target": [0, 1, 2], "flip": False}]}
