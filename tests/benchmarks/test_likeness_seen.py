@@ -81,11 +81,11 @@ def column() -> tuple[np.ndarray, np.ndarray]:
     return vertices, np.array(faces)
 
 
-def ends() -> tuple[LimbEnds, np.ndarray]:
+def ends(parents: tuple[int, ...] = (-1, 0, 1)) -> tuple[LimbEnds, np.ndarray]:
     vertices, faces = column()
     nodes = np.array([[0.0, 1.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 0.0]])
     plan = BodyPlan(trunk=(0,), legs={Side.LEFT: Limb((0, 1), (1, 2))})
-    return LimbEnds(vertices, faces, Tree(np.array([-1, 0, 1]), nodes), plan), vertices
+    return LimbEnds(vertices, faces, Tree(np.array(parents), nodes), plan), vertices
 
 
 def test_an_end_that_turns_keeps_its_volume():
@@ -94,6 +94,12 @@ def test_an_end_that_turns_keeps_its_volume():
     for _ in range(3):
         kept.add(turn.apply(vertices) + np.array([1.0, 2.0, 3.0]))
     assert kept.kept == {"left leg": pytest.approx(1.0)}
+
+
+def test_a_skeleton_that_is_rooted_in_a_foot_has_the_same_ends():
+    kept, vertices = ends(parents=(1, 2, -1))
+    kept.add(vertices * np.where(vertices[:, 1:2] < 0.3, (1.0, 0.25, 1.0), 1.0))
+    assert kept.kept["left leg"] == pytest.approx(0.25)
 
 
 def test_a_foot_that_is_pressed_flat_is_crushed_and_a_pressed_thigh_is_not():

@@ -29,6 +29,7 @@ class LimbEnds:
     """
 
     def __init__(self, vertices: Array, faces: Indices, tree: Tree, plan: BodyPlan) -> None:
+        tree = tree.rerooted(plan.hips)  # a bone is told by its outer node
         owner, share = _nearest_bones(vertices, tree)
         self._faces: dict[str, Indices] = {}
         self._rest: dict[str, float] = {}
