@@ -343,6 +343,7 @@ class OpenedShow:
             self._open_recorder,
             tell=self._warn,
             waits=loses_no_frame(self._source),
+            clock=self._clock,
         )
         self._closing.enter_context(takes)
         if recorder is not None:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import threading
+import time
+from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from typing import Self
@@ -12,11 +15,15 @@ from replay.recorded_stream import RecordedStream
 from replay.recorder import Recorder
 from runtime.output.files.kept_file import Kept, counting, size_of
 
+STARTS, WITHIN = 3, 3.0  # most takes that start within so many seconds
 MOST = 9999  # takes in one folder under one name
 
 
 class Takes:
     """Starts and ends recordings of a stream; never replaces a file.
+
+    At most `STARTS` takes start in `WITHIN` seconds, whoever asks: a remote control that floods the
+    show would fill the folder.
 
     If a take cannot start, a warning says so and the show goes on. Ending a take does not wait for
     the disk: a thread writes the rest, and `close` waits for it.
@@ -27,6 +34,7 @@ class Takes:
         open_recorder: opens the file of a take.
         tell: takes one line on a fault.
         waits: whether the stream may wait for the disk, so that no frame is lost.
+        clock: host monotonic time [s].
 
     Attributes:
         kept: what lies where takes were written, in the order in which they ended.
@@ -40,12 +48,16 @@ class Takes:
         *,
         tell: Callable[[str], None],
         waits: bool = False,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._stream = stream
         self._path = path
         self._open = open_recorder
         self._tell = tell
         self._waits = waits
+        self._clock = clock
+        self._started = deque([-math.inf] * STARTS, STARTS)
+        self._hurried = False  # whether a start came too soon since the last one
         self._recorder: Recorder | None = None
         self._ending: list[threading.Thread] = []
         self.kept: list[Kept] = []
@@ -63,12 +75,24 @@ class Takes:
 
     def start(self) -> None:
         """Start a take in a new file, unless one is running."""
-        if self.recording:
+        if self.recording or self._too_soon():
             return
         try:
             self.record(self._open(_fresh(self._path)))
         except InputError as error:
             self._tell(f"{error}; the show goes on without being recorded")
+
+    def _too_soon(self) -> bool:
+        """Whether enough takes started a moment ago; the first start that is left out is told."""
+        now = self._clock()
+        if now - self._started[0] >= WITHIN:
+            self._started.append(now)
+            self._hurried = False
+            return False
+        if not self._hurried:
+            self._hurried = True
+            self._tell(f"{STARTS} takes began within {WITHIN:g} s: no other one is started yet")
+        return True
 
     def stop(self) -> None:
         """End the running take, if there is one."""

@@ -7,9 +7,13 @@ from pathlib import Path
 import pytest
 
 from devices.errors import InputError
+from replay.builtin import builtin_recording
 from replay.formats import read_recording
+from replay.player import EveryFrame, Player
+from replay.recorded_stream import RecordedStream
+from replay.recorder import Recorder
 from runtime.cli import main
-from runtime.show.takes import MOST, set_aside
+from runtime.show.takes import MOST, Takes, set_aside
 
 
 def test_a_second_take_under_the_same_name_leaves_the_first(
@@ -57,3 +61,23 @@ def test_where_all_names_are_taken_the_take_stays(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="move some away"):
         set_aside(tmp_path / "take.mcap", [].append)
     assert (tmp_path / "take.mcap").read_text() == "kept"
+
+
+def test_a_flood_of_starts_makes_three_takes_in_three_seconds(tmp_path: Path) -> None:
+    clip = builtin_recording("wave")
+    now, told = [0.0], list[str]()
+    takes = Takes(
+        RecordedStream(Player(clip, EveryFrame())),
+        tmp_path / "take.mcap",
+        lambda path: Recorder(path, clip.skeleton, tell=told.append),
+        tell=told.append,
+        clock=lambda: now[0],
+    )
+    for press in range(2300):  # a hundred a second
+        now[0] = press / 100
+        takes.start()
+        takes.stop()
+    takes.close()
+    assert len(list(tmp_path.iterdir())) == 24  # in 23 s
+    assert 0 < len(told) < 24  # and not a line for each of 2300 presses
+    assert set(told) == {"3 takes began within 3 s: no other one is started yet"}
