@@ -23,6 +23,7 @@ PATHS = {"translation": 3, "rotation": 4, "scale": 3}
 MOST_CHANNELS = 100_000
 _LATEST = 1e6  # [s] of a key
 _USUAL_RATE = 60.0
+_SAME = 1e-5  # [s] between keys of one frame
 _EVEN = 0.02  # of a step by which even keys differ
 _RATES = (10.0, 1000.0)  # plausible rates of keys that were sampled from a motion
 
@@ -56,7 +57,8 @@ class Track:
         )
         share = np.clip(share, 0.0, 1.0)[:, None]
         if self.way == "STEP":
-            return self.values[np.where(share[:, 0] >= 1.0, after, before)]
+            held: Array = self.values[np.where(share[:, 0] >= 1.0, after, before)]
+            return _unit(held) if held.shape[1] == 4 else held
         if self.way == "CUBICSPLINE":
             blended = self._hermite(before, after, share, step[:, None])
             return _unit(blended) if blended.shape[1] == 4 else blended
@@ -105,7 +107,8 @@ class Animation:
         Raises:
             ContentError: there would be too many.
         """
-        keys = np.unique(np.round(np.concatenate([t.times for t in self.tracks.values()]), 6))
+        keys = np.unique(np.concatenate([track.times for track in self.tracks.values()]))
+        keys = keys[np.diff(keys, prepend=-np.inf) > _SAME]
         steps = np.diff(keys)
         if not len(steps):
             return keys
@@ -188,7 +191,7 @@ def check_size(frames: float, nodes: int) -> None:
 def _unit(quaternions: Array) -> Array:
     length = np.linalg.norm(quaternions, axis=1, keepdims=True)
     unit: Array = np.divide(
-        quaternions, length, out=np.full_like(quaternions, np.nan), where=length > 0
+        quaternions, length, out=np.full_like(quaternions, np.nan), where=length > 1e-9
     )
     return unit
 
@@ -203,4 +206,6 @@ def _slerp(first: Array, second: Array, share: Array) -> Array:
     wide = np.where(close, 1.0, sine)
     a = np.where(close, 1.0 - share, np.sin((1.0 - share) * angle) / wide)
     b = np.where(close, share, np.sin(share * angle) / wide)
-    return _unit(a * first + b * second)
+    turned: Array = np.where(share > 0.0, _unit(a * first + b * second), first)
+    turned = np.where(share >= 1.0, second, turned)
+    return turned

@@ -144,7 +144,7 @@ def _posed(
         )
         rigid &= bool((size > 0.0).all())
         rigid &= bool((np.ptp(size, axis=-1) <= _ALIKE * np.abs(size).max(axis=-1)).all())
-        own = as_matrices(np.broadcast_to(turn, (len(times), 4))) * size[..., None, :]
+        own = _matrices(np.broadcast_to(turn, (len(times), 4))) * size[..., None, :]
         parent = int(scene.parents[node])
         if parent < 0:
             positions[:, number], rotations[:, number], linear[:, number] = move, turn, own
@@ -156,6 +156,15 @@ def _posed(
         linear[:, number] = linear[:, above] @ own
         rotations[:, number] = multiply(rotations[:, above], turn)
     return positions, rotations if rigid else None
+
+
+def _matrices(quaternions: Array) -> Array:
+    """Matrices (T, 3, 3) of unit quaternions (T, 4); NaN where one is not finite."""
+    known = np.isfinite(quaternions).all(axis=1)
+    matrices = np.full((len(quaternions), 3, 3), np.nan)
+    if known.any():
+        matrices[known] = as_matrices(quaternions[known])
+    return matrices
 
 
 def _parts(matrix: Array) -> tuple[Array, Array, Array]:

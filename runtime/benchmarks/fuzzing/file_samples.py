@@ -141,6 +141,7 @@ def recording_samples(folder: Path) -> Iterator[tuple[str, bytes]]:
     poses = np.full((2, 3 * len(ORDER)), 0.1)
     np.savez(packed, poses=poses, trans=np.zeros((2, 3)), mocap_framerate=30.0, betas=np.zeros(4))
     yield "smpl.npz", packed.getvalue()
+    yield "walk.gltf", json.dumps(_moving_nodes()).encode()
 
 
 def character_samples() -> Iterator[tuple[str, bytes]]:
@@ -200,6 +201,35 @@ def person(frame: int = 0) -> list[list[float]]:
 def _landmarks(frame: int) -> dict[str, object]:
     points = [dict(zip(("x", "y", "z", "visibility"), row, strict=True)) for row in person(frame)]
     return {"timestamp_ms": 33 * frame, "pose_world_landmarks": [points]}
+
+
+def _moving_nodes() -> dict[str, object]:
+    """A glTF document of two nodes: one moves along, the other turns, each by two keys."""
+    keys = [0.0, 0.5, 0, 1, 0, 0, 1, 2, 0, 0, 0, 1, 0.6, 0, 0, 0.8]
+    content = base64.b64encode(np.array(keys, dtype="<f4").tobytes()).decode()
+    sizes = (("SCALAR", 0, 8), ("VEC3", 8, 24), ("VEC4", 32, 32))
+    target = ("translation", "rotation")
+    return {
+        "asset": {"version": "2.0"},
+        "nodes": [
+            {"name": "hips", "translation": [0, 1, 0], "children": [1]},
+            {"name": "spine", "translation": [0, 0.5, 0]},
+        ],
+        "animations": [
+            {
+                "samplers": [{"input": 0, "output": k, "interpolation": "LINEAR"} for k in (1, 2)],
+                "channels": [
+                    {"sampler": k, "target": {"node": k, "path": target[k]}} for k in (0, 1)
+                ],
+            }
+        ],
+        "accessors": [
+            {"bufferView": k, "componentType": 5126, "count": 2, "type": sizes[k][0]}
+            for k in range(3)
+        ],
+        "bufferViews": [{"buffer": 0, "byteOffset": at, "byteLength": n} for _, at, n in sizes],
+        "buffers": [{"byteLength": 64, "uri": f"data:;base64,{content}"}],
+    }
 
 
 def _landmark_table() -> str:

@@ -192,6 +192,14 @@ def test_lost_numbers_are_gaps(tmp_path: Path) -> None:
     assert recording.confidence.tolist() == [[1, 1], [1, 0], [1, 1]]
 
 
+@pytest.mark.parametrize("way", ["STEP", "LINEAR"])
+def test_a_rotation_that_is_none_is_a_gap(way: str, tmp_path: Path) -> None:
+    clip = Clip()
+    clip.move(0, "rotation", np.arange(3) / 30, [[0, 0, 0, 1], [0, 0, 0, 0], [0, 0, 0, 2]], way)
+    recording = read_recording(clip.save(tmp_path))
+    assert recording.confidence.tolist() == [[1, 1], [1, 0], [1, 1]]
+
+
 @pytest.mark.parametrize(
     ("times", "values", "way", "says"),
     [
