@@ -39,7 +39,6 @@ EXTRAS = {
     "fast_simplification",
     "flatbuffers",
     "igl",
-    "imgui_bundle",
     "manifold3d",
     "mediapipe",
     "meshio",
@@ -132,6 +131,10 @@ def test_the_library_loads_nothing_before_it_is_used() -> None:
     assert "numpy" not in loaded_by("from runtime import ShowSettings; ShowSettings()")
 
 
+def test_only_a_window_loads_what_its_panel_needs() -> None:
+    assert "imgui_bundle" not in loaded_by("import runtime.show.show, runtime.cli")
+
+
 def test_the_command_line_answers_without_loading_what_a_command_needs() -> None:
     asked = (
         "import contextlib, io, runtime.cli\n"
@@ -154,12 +157,13 @@ def test_only_the_renderer_and_the_window_touch_graphics() -> None:
         if parsed(path).imports & GRAPHICS
     }
     # A show passes a context on and names its type; it calls nothing of moderngl.
-    passing = {f"runtime/show/{name}.py" for name in ("opening", "scene", "show")}
+    named = ("show/opening", "show/scene", "show/show", "control/keys", "panel/gui", "panel/panel")
+    passing = {f"runtime/{name}.py" for name in named}
     outside = {path for path in touching if not path.startswith("runtime/render/")}
     assert outside <= {"runtime/control/window.py", *passing}
     for path in passing:
         source = text_of(CHECKOUT / path)
-        assert set(re.findall(r"moderngl\.(\w+)", source)) <= {"Context"}, path
+        assert set(re.findall(r"moderngl\.(\w+)", source)) <= {"Context", "Framebuffer"}, path
 
 
 @pytest.mark.parametrize("room", ROOMS)

@@ -20,8 +20,8 @@ from runtime.show.collector_pauses import collector_paused
 from runtime.show.interrupts import Interrupted
 from runtime.show.outputs import check_outputs
 from runtime.show.pacing import AtOnce
-from runtime.show.progress import Progress
 from runtime.show.show import Show
+from runtime.status.progress import Progress
 
 
 def perform(
@@ -58,7 +58,8 @@ def perform(
             messages.warn(
                 "this show has no window, file or sender, and runs until Ctrl-C: nobody sees it"
             )
-        show = Show(stream, characters, settings, pace=AtOnce() if options.fast else None)
+        pace = AtOnce() if options.fast else None
+        show = Show(stream, characters, settings, pace=pace, tell=messages.say)
         try:
             with show:
                 _run(show, stream)

@@ -30,9 +30,9 @@ from runtime.puppet.deformable_surface import Elasticity
 from runtime.render.normals import DeformingNormals, bounding_box, split_vertices
 from runtime.show.messages import say
 from runtime.show.open_stream import play
-from runtime.show.progress import Progress
 from runtime.show.settings import CharacterSettings, ShowSettings
 from runtime.show.show import Show
+from runtime.status.progress import Progress
 from solvers.arap import ENERGIES
 from solvers.deform.skinning import SkinnedSurface
 from solvers.kernels.cache import count_compiled, has_list, remove_unused, save_list

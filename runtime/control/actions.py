@@ -6,45 +6,13 @@ tests read the names, texts and ranges of this table and have none of their own.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from enum import Enum
 
-from replay.playback import Playback
-from runtime.conditioning.switches import SWITCHES, Conditioning
-from runtime.puppet.deformable_surface import Elasticity
-from runtime.puppet.puppet import Puppet
-from runtime.show.act_group import MatchControls
-from runtime.show.loop import FrameLoop
-from runtime.show.scene import Scene
-from runtime.show.takes import Takes
-
-STEP = 0.1  # share of a fader's range that one key press moves it
-
-
-@dataclass(slots=True, eq=False)
-class ShowControls:
-    """The parts of a show that actions change.
-
-    Attributes:
-        match_controls: matching, of all acts.
-        conditioning: the switches of the conditioning.
-        loop: the frame loop, which freezes the characters.
-        puppets: all characters as they are driven.
-        takes: the recorder of takes.
-        playback: the playback of a recording; None where the stream is live.
-        scene: the picture; None where no picture is drawn.
-        leaving: whether the show is to end.
-    """
-
-    match_controls: MatchControls
-    conditioning: Conditioning
-    loop: FrameLoop
-    puppets: Sequence[Puppet]
-    takes: Takes
-    playback: Playback | None = None
-    scene: Scene | None = None
-    leaving: bool = False
+from runtime.conditioning.switches import SWITCHES
+from runtime.control.show_controls import ShowControls
+from runtime.control.sliders import SLIDERS, STEP, Slider
 
 
 class Kind(Enum):
@@ -65,16 +33,20 @@ class Action:
     """One row of the table.
 
     Attributes:
+        label: its name on a button.
         text: what the action does, in a few words.
         press: does it, as a button or a key does; None for a fader.
         write: sets its value in [0, 1]; None where there is no value to set.
         read: returns its value in [0, 1], for a light or a fader; None where there is none.
+        words: says what a press has done, where that is not its label with its state.
     """
 
+    label: str
     text: str
     press: Do | None = None
     write: Write | None = None
     read: Read | None = None
+    words: Callable[[ShowControls], str] | None = None
 
     @property
     def kind(self) -> Kind:
@@ -84,87 +56,29 @@ class Action:
         return Kind.PRESS if self.write is None else Kind.SWITCH
 
 
-@dataclass(frozen=True, slots=True)
-class Slider:
-    """A number that all characters' surfaces share, with one fader and two keys.
-
-    Attributes:
-        field: its field of `Elasticity`, in [0, `most`].
-        most: the fader's upper end.
-        text: what the fader sets.
-        more: what the action that raises it does.
-        less: what the action that lowers it does.
-    """
-
-    field: str
-    most: float
-    text: str
-    more: str
-    less: str
-
-    def read(self, controls: ShowControls) -> float:
-        """Return the first character's value as a share of the fader's range."""
-        value = float(getattr(controls.puppets[0].surface.elasticity, self.field))
-        return min(value / self.most, 1.0)
-
-    def write(self, controls: ShowControls, share: float) -> None:
-        """Set all characters to a share of the fader's range."""
-        for surface in (puppet.surface for puppet in controls.puppets):
-            changed: Elasticity = replace(surface.elasticity, **{self.field: share * self.most})
-            if changed != surface.elasticity:
-                surface.elasticity = changed
-
-    def move(self, controls: ShowControls, by: float) -> None:
-        """Move the fader by a share of its range; a value beyond its upper end stays."""
-        share = self.read(controls)
-        moved = min(max(share + by, 0.0), 1.0)
-        if moved != share:
-            self.write(controls, moved)
-
-
-SLIDERS: Mapping[str, Slider] = {
-    "cartoon": Slider(
-        "cartoon",
-        1.0,
-        "how much characters squash and stretch, from not at all",
-        "more squash and stretch",
-        "less squash and stretch",
-    ),
-    "volume": Slider(
-        "volume_gain",
-        2.0,  # the middle of the fader keeps exactly the volume
-        "how much of their volume is kept; more than all of it above the middle",
-        "keep more of the volume",
-        "keep less of the volume",
-    ),
-    "stiffness": Slider(
-        "stiffness",
-        0.99,  # at 1 the deformation of a limb has no solution
-        "how stiff limbs are between their joints",
-        "stiffer limbs",
-        "softer limbs",
-    ),
-}
-
 STEPS = {
-    "order": "dropping late and duplicate frames, on or off",
-    "identities": "steady identities, on or off",
-    "swaps": "putting swapped limbs right, on or off",
-    "outliers": "the gate for outliers, on or off",
-    "filter": "smoothing, on or off",
-    "predict": "prediction, on or off",
-    "level": "levelling the floor, on or off",
-    "mirror": "exchanging left and right, on or off",
-    "scale": "one size for all performers, on or off",
-    "recalibrate": "calibrating by a T or A pose kept still, on or off",
+    "order": ("Order", "dropping late and duplicate frames, on or off"),
+    "identities": ("Identities", "steady identities, on or off"),
+    "swaps": ("Swapped limbs", "putting swapped limbs right, on or off"),
+    "outliers": ("Outliers", "the gate for outliers, on or off"),
+    "filter": ("Smoothing", "smoothing, on or off"),
+    "predict": ("Prediction", "prediction, on or off"),
+    "level": ("Level floor", "levelling the floor, on or off"),
+    "mirror": ("Mirror", "exchanging left and right, on or off"),
+    "scale": ("One size", "one size for all performers, on or off"),
+    "recalibrate": ("T pose", "calibrating by a T or A pose kept still, on or off"),
 }
 
 
 def _switch(
-    text: str, read: Callable[[ShowControls], bool], write: Callable[[ShowControls, bool], None]
+    label: str,
+    text: str,
+    read: Callable[[ShowControls], bool],
+    write: Callable[[ShowControls, bool], None],
 ) -> Action:
     """Build an action that is on or off: a press reverses it, `write` sets it."""
     return Action(
+        label,
         text,
         press=lambda controls: write(controls, not read(controls)),
         write=lambda controls, value: write(controls, value >= 0.5),
@@ -175,24 +89,29 @@ def _switch(
 def _slider_actions(name: str, slider: Slider) -> dict[str, Action]:
     """Build a slider's fader and the two actions that move it by a step."""
     return {
-        name: Action(slider.text, write=slider.write, read=slider.read),
-        f"{name}-up": Action(slider.more, press=lambda controls: slider.move(controls, STEP)),
-        f"{name}-down": Action(slider.less, press=lambda controls: slider.move(controls, -STEP)),
+        name: Action(slider.label, slider.text, write=slider.write, read=slider.read),
+        f"{name}-up": Action(
+            f"{slider.label} +",
+            slider.more,
+            press=lambda controls: slider.move(controls, STEP),
+            words=slider.words,
+        ),
+        f"{name}-down": Action(
+            f"{slider.label} -",
+            slider.less,
+            press=lambda controls: slider.move(controls, -STEP),
+            words=slider.words,
+        ),
     }
 
 
-def _conditioning(name: str, text: str) -> Action:
+def _conditioning(name: str, label: str, text: str) -> Action:
     """Build the action of one switch of the conditioning."""
 
     def write(controls: ShowControls, on: bool) -> None:
         controls.conditioning.switch(name, on)
 
-    return _switch(text, lambda controls: bool(getattr(controls.conditioning, name)), write)
-
-
-def _accept(controls: ShowControls) -> None:
-    if controls.match_controls.matching:
-        controls.match_controls.accept()
+    return _switch(label, text, lambda controls: bool(getattr(controls.conditioning, name)), write)
 
 
 def _is_paused(controls: ShowControls) -> bool:
@@ -225,7 +144,7 @@ def _freeze(controls: ShowControls, on: bool) -> None:
 
 
 def _in_place(controls: ShowControls, on: bool) -> None:
-    for puppet in controls.puppets:
+    for puppet in controls.selected:
         puppet.travel.in_place = on
 
 
@@ -244,74 +163,181 @@ def _frame_all(controls: ShowControls) -> None:
         controls.scene.frame_all()
 
 
+def _panel(controls: ShowControls, on: bool) -> None:
+    controls.view.panel = on
+
+
+def _sliders(controls: ShowControls, on: bool) -> None:
+    controls.view.sliders = on
+
+
+def _help(controls: ShowControls, on: bool) -> None:
+    controls.view.help = on
+
+
+def _full_screen(controls: ShowControls, on: bool) -> None:
+    controls.view.full_screen = on
+
+
+def _front(controls: ShowControls) -> None:
+    if controls.scene is not None:
+        controls.scene.view_from_front()
+
+
+def _select(controls: ShowControls) -> None:
+    """Select the next character; after the last one all of them."""
+    count, before = len(controls.puppets), controls.match_controls.selected
+    after = 0 if before is None else before + 1
+    controls.select(after if after < count else None)
+    which = "all characters" if after >= count else controls.puppets[after].character.name
+    controls.notices.show(f"keys are for {which}")
+
+
 def _leave(controls: ShowControls) -> None:
+    """Leave; while something is recorded, only when asked twice."""
+    running = controls.takes.running
+    if running and not controls.leave_asked.again():
+        names = ", ".join(take.path.name for take in running)
+        controls.notices.show(f"{names} is being recorded: press again to end it and leave")
+        return
     controls.leaving = True
 
 
 ACTIONS: Mapping[str, Action] = {
     "match-again": Action(
+        "Match again",
         "match again: strike a pose, the best match is shown",
         press=lambda controls: controls.match_controls.match_again(),
         read=lambda controls: float(controls.match_controls.matching),
     ),
-    "accept": Action("accept the match shown; the pose is the rest state", press=_accept),
+    "accept": Action(
+        "Accept",
+        "accept the match shown; the pose is the rest state",
+        press=lambda controls: controls.match_controls.accept(),
+    ),
     "next-match": Action(
-        "the next match", press=lambda controls: controls.match_controls.next_match()
+        "Next match", "the next match", press=lambda controls: controls.match_controls.next_match()
     ),
     "previous-match": Action(
-        "the match before", press=lambda controls: controls.match_controls.previous_match()
+        "Previous match",
+        "the match before",
+        press=lambda controls: controls.match_controls.previous_match(),
     ),
     "rest-pose": Action(
-        "the pose is the rest state", press=lambda controls: controls.match_controls.take_rest()
+        "Rest pose",
+        "the pose is the rest state",
+        press=lambda controls: controls.match_controls.take_rest(),
     ),
     "calibrate": Action(
+        "Calibrate",
         "calibrate: the pose is the rest state, floor and sizes are measured anew",
         press=lambda controls: controls.match_controls.calibrate(),
     ),
-    "hold": _switch("pause or resume playback (a recording)", _is_paused, _pause),
+    "hold": _switch("Play / pause", "pause or resume playback (a recording)", _is_paused, _pause),
     "play": Action(
+        "Play",
         "resume playback (a recording)",
         press=lambda controls: _pause(controls, False),
         read=lambda controls: float(not _is_paused(controls)),
     ),
     "pause": Action(
+        "Pause",
         "pause playback (a recording)",
         press=lambda controls: _pause(controls, True),
         read=lambda controls: float(_is_paused(controls)),
     ),
-    "home": Action("back to the start (a recording)", press=_home),
+    "home": Action("To the start", "back to the start (a recording)", press=_home),
     "record": _switch(
+        "Record",
         "begin or end a take: the performer goes to a new file",
         lambda controls: controls.takes.recording,
         _record,
     ),
     "freeze": _switch(
+        "Freeze",
         "freeze: characters stand still while the stream goes on",
         lambda controls: controls.loop.frozen,
         _freeze,
     ),
     "in-place": _switch(
+        "In place",
         "in place: characters stay where they are, or travel as their performers do",
-        lambda controls: controls.puppets[0].travel.in_place,
+        lambda controls: controls.selected[0].travel.in_place,
         _in_place,
     ),
     "blackout": _switch(
+        "Blackout",
         "blackout: fade to black, and back",
         lambda controls: controls.scene is not None and controls.scene.blackout.target > 0.0,
         _blackout,
     ),
-    "frame-all": Action("frame every character", press=_frame_all),
+    "select": Action(
+        "Next character", "select the next character for the keys, or all", press=_select
+    ),
+    "keep-match": Action(
+        "Keep",
+        "stop matching: go on as before",
+        press=lambda controls: controls.match_controls.keep(),
+    ),
+    "front": Action("Front", "look from the front again", press=_front),
+    "frame-all": Action("Frame all", "frame every character", press=_frame_all),
     "chains": _switch(
+        "Chains",
         "show or hide the matched chains",
         lambda controls: controls.scene is not None and controls.scene.highlights,
         _chains,
+    ),
+    "panel": _switch(
+        "Panel", "show or hide the panel", lambda controls: controls.view.panel, _panel
+    ),
+    "sliders": _switch(
+        "Sliders",
+        "show or hide sliders and switches",
+        lambda controls: controls.view.sliders,
+        _sliders,
+    ),
+    "help": _switch("Help", "show or hide all keys", lambda controls: controls.view.help, _help),
+    "full-screen": _switch(
+        "Full screen",
+        "fill the screen with the window, or not",
+        lambda controls: controls.view.full_screen,
+        _full_screen,
     ),
     **{
         name: action
         for slider_name, slider in SLIDERS.items()
         for name, action in _slider_actions(slider_name, slider).items()
     },
-    **{name: _conditioning(name, STEPS[name]) for name in SWITCHES},
-    "leave": Action("leave", press=_leave),
+    **{name: _conditioning(name, *STEPS[name]) for name in SWITCHES},
+    "leave": Action("Leave", "leave", press=_leave),
 }
 """Every action by its name. A new action is one more row, and a key in `runtime.control.keys`."""
+
+
+def press(name: str, controls: ShowControls) -> None:
+    """Press an action, as a key or a button does, and say on the panel what it has done."""
+    action = ACTIONS[name]
+    if action.press is None:
+        return
+    before = controls.notices.latest
+    action.press(controls)
+    controls.loop.perform_again()
+    if controls.notices.latest is before:  # it has not spoken for itself
+        controls.notices.show(_done(action, controls))
+
+
+def set_value(name: str, value: float, controls: ShowControls) -> None:
+    """Set a switch or a fader to a value in [0, 1]."""
+    action = ACTIONS[name]
+    if action.write is not None:
+        action.write(controls, value)
+        controls.loop.perform_again()
+
+
+def _done(action: Action, controls: ShowControls) -> str:
+    """What an action has just done, in words."""
+    if action.words is not None:
+        return action.words(controls)
+    if action.read is None or action.kind is Kind.PRESS:
+        return action.label
+    return f"{action.label}: {'on' if action.read(controls) >= 0.5 else 'off'}"

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
-from runtime.control.actions import ACTIONS, Kind, ShowControls
+from typing import TYPE_CHECKING, Protocol
+
+from runtime.control.actions import ACTIONS, Kind, press
+from runtime.control.show_controls import ShowControls
 from runtime.control.window import Event, KeyPressed, Resized, Window
 from runtime.show.scene import Scene
+
+if TYPE_CHECKING:
+    import moderngl
 
 KEYS = {
     "m": "match-again",
@@ -37,6 +43,13 @@ KEYS = {
     "page-down": "volume-down",
     ".": "stiffness-up",
     ",": "stiffness-down",
+    "n": "select",
+    "backspace": "keep-match",
+    "v": "front",
+    "tab": "panel",
+    "d": "sliders",
+    "?": "help",
+    "f11": "full-screen",
     "escape": "leave",
 }
 """The action of each key."""
@@ -58,6 +71,14 @@ def key_hint() -> str:
     return "keys: " + ", ".join(f"{key_of[name]} to {words}" for name, words in _HINTED.items())
 
 
+class Overlay(Protocol):
+    """What is drawn over the picture in the window."""
+
+    def draw(self, target: moderngl.Framebuffer) -> None:
+        """Draw it over a framebuffer of the window's size."""
+        ...
+
+
 class WindowControls:
     """Runs the show by the window's keys and mouse.
 
@@ -65,12 +86,16 @@ class WindowControls:
         window: the window that is open.
         scene: the picture in it; the mouse moves its camera.
         controls: what the actions of the keys change.
+        panel: is drawn over the picture, and takes input first; None without one.
     """
 
-    def __init__(self, window: Window, scene: Scene, controls: ShowControls) -> None:
+    def __init__(
+        self, window: Window, scene: Scene, controls: ShowControls, panel: Overlay | None = None
+    ) -> None:
         self._window = window
         self._scene = scene
         self._controls = controls
+        self._panel = panel
         self._camera = window.camera = scene.camera
 
     def serve(self) -> None:
@@ -82,17 +107,21 @@ class WindowControls:
             self._handle(event)
         self._camera = self._window.camera = self._scene.camera
         self._controls.leaving = self._controls.leaving or self._window.should_close
+        if self._window.full_screen is not self._controls.view.full_screen:
+            self._window.full_screen = self._controls.view.full_screen
+            self._controls.view.full_screen = self._window.full_screen  # there may be no screen
 
     def present(self) -> None:
         """Show the newest picture in the window."""
         self._scene.stage.show(self._window.framebuffer)
+        if self._panel is not None:
+            self._panel.draw(self._window.framebuffer)
         self._window.swap()
 
     def _handle(self, event: Event) -> None:
         if isinstance(event, Resized):
             self._scene.stage.resize(event.size)
         elif isinstance(event, KeyPressed) and event.key in KEYS:
-            action = ACTIONS[KEYS[event.key]]
-            is_repeat = event.again and action.kind is Kind.SWITCH  # by a key that is held down
-            if action.press is not None and not is_repeat:
-                action.press(self._controls)
+            name = KEYS[event.key]
+            if not (event.again and ACTIONS[name].kind is Kind.SWITCH):  # by a key held down
+                press(name, self._controls)

@@ -26,7 +26,8 @@ from devices.osc.messages import (
     write_message,
 )
 from devices.transport.udp import UdpTransport
-from runtime.control.actions import ACTIONS, ShowControls
+from runtime.control.actions import ACTIONS, press, set_value
+from runtime.control.show_controls import ShowControls
 
 PORT = 9100
 ROOT = "/bunraku/"
@@ -140,12 +141,11 @@ class Remote:
     def serve(self, controls: ShowControls) -> None:
         """Do the requests since the last call, and answer with the state of all actions."""
         for request in self._next():
-            action = ACTIONS[request.action]
             try:
-                if request.value is None and action.press is not None:
-                    action.press(controls)
-                elif request.value is not None and action.write is not None:
-                    action.write(controls, request.value)
+                if request.value is None:
+                    press(request.action, controls)
+                else:
+                    set_value(request.action, request.value, controls)
             except InputError as error:
                 self._warn(request.action, str(error))
         self._answer(controls)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 from weakref import WeakSet
 
 import glfw
@@ -52,6 +52,33 @@ class Resized:
 
 Event = KeyPressed | Resized
 
+
+class InputTaker(Protocol):
+    """Takes the window's input first, such as a panel; returns whether it keeps it for itself."""
+
+    def key(self, name: str, *, down: bool, shift: bool, control: bool) -> bool:
+        """Take a key, by its name in `KeyPressed`."""
+        ...
+
+    def letter(self, character: str) -> bool:
+        """Take a typed character."""
+        ...
+
+    def button(self, button: int, *, down: bool) -> bool:
+        """Take a button of the mouse: 0 left, 1 right, 2 middle."""
+        ...
+
+    def cursor(self, x: float, y: float) -> bool:
+        """Take the place of the mouse [px of the framebuffer] from the upper left corner."""
+        ...
+
+    def scroll(self, right: float, up: float) -> bool:
+        """Take notches of the wheel."""
+        ...
+
+
+SIGNS = "?"  # typed characters that are keys, on whatever key a keyboard has them
+
 KEY_NAMES = {
     glfw.KEY_SPACE: "space",
     glfw.KEY_ESCAPE: "escape",
@@ -85,6 +112,7 @@ class Window:
 
     Attributes:
         camera: the camera that the mouse moves; may be set.
+        taker: takes input before the window does; None for nothing.
         context: the window's GL context.
         handle: glfw's window; None after `close`.
 
@@ -109,11 +137,14 @@ class Window:
             raise
         _windows.add(self)
         self.camera: Camera = front_camera()
+        self.taker: InputTaker | None = None
+        self._windowed: tuple[int, int, int, int] | None = None
         self._events: list[Event] = []
         self._cursor = glfw.get_cursor_pos(self.handle)
         self._dragging: int | None = None
         glfw.swap_interval(1)
         glfw.set_key_callback(self.handle, self._on_key)
+        glfw.set_char_callback(self.handle, self._on_letter)
         glfw.set_mouse_button_callback(self.handle, self._on_button)
         glfw.set_cursor_pos_callback(self.handle, self._on_cursor)
         glfw.set_scroll_callback(self.handle, self._on_scroll)
@@ -134,6 +165,27 @@ class Window:
     def should_close(self) -> bool:
         """Whether the user asked to close the window."""
         return bool(glfw.window_should_close(self.handle))
+
+    @property
+    def full_screen(self) -> bool:
+        """Whether the window fills the screen that most of it is on."""
+        return self._windowed is not None
+
+    @full_screen.setter
+    def full_screen(self, on: bool) -> None:
+        if on and self._windowed is None:
+            place = (*glfw.get_window_pos(self.handle), *glfw.get_window_size(self.handle))
+            monitor = _monitor_under(place)
+            if monitor is None:
+                return
+            mode = glfw.get_video_mode(monitor)
+            self._windowed = place
+            width, height = mode.size
+            glfw.set_window_monitor(self.handle, monitor, 0, 0, width, height, mode.refresh_rate)
+        elif not on and self._windowed is not None:
+            nothing: Any = None  # which glfw takes, though its types do not say so
+            glfw.set_window_monitor(self.handle, nothing, *self._windowed, 0)
+            self._windowed = None
 
     def make_current(self) -> None:
         """Make the window's context current on this thread, and no headless one."""
@@ -164,16 +216,29 @@ class Window:
         self.close()
 
     def _on_key(self, _: object, key: int, scancode: int, action: int, mods: int) -> None:
-        if action == glfw.RELEASE:
-            return
         name = KEY_NAMES.get(key) or glfw.get_key_name(key, scancode)
-        if name:
-            shift, control = bool(mods & glfw.MOD_SHIFT), bool(mods & glfw.MOD_CONTROL)
-            again = action == glfw.REPEAT
+        if not name:
+            return
+        down, again = action != glfw.RELEASE, action == glfw.REPEAT
+        shift, control = bool(mods & glfw.MOD_SHIFT), bool(mods & glfw.MOD_CONTROL)
+        if self.taker is not None and self.taker.key(
+            name.lower(), down=down, shift=shift, control=control
+        ):
+            return
+        if down:
             self._events.append(KeyPressed(name.lower(), shift, control, again))
 
+    def _on_letter(self, _: object, code: int) -> None:
+        if self.taker is not None and self.taker.letter(chr(code)):
+            return
+        if chr(code) in SIGNS:
+            self._events.append(KeyPressed(chr(code)))
+
     def _on_button(self, _: object, button: int, action: int, mods: int) -> None:
-        if action == glfw.RELEASE:
+        down = action != glfw.RELEASE
+        if self.taker is not None and self.taker.button(button, down=down):
+            return
+        if not down:
             self._dragging = None
         else:
             shifted = button == glfw.MOUSE_BUTTON_LEFT and mods & glfw.MOD_SHIFT
@@ -182,6 +247,10 @@ class Window:
     def _on_cursor(self, _: object, x: float, y: float) -> None:
         right, down = x - self._cursor[0], y - self._cursor[1]
         self._cursor = (x, y)
+        if self.taker is not None:
+            dense = self.size[0] / max(glfw.get_window_size(self.handle)[0], 1)
+            if self.taker.cursor(dense * x, dense * y):
+                return
         if self._dragging is None:
             return
         if self._dragging == glfw.MOUSE_BUTTON_LEFT:
@@ -191,7 +260,8 @@ class Window:
             self.camera = self.camera.pan(-right / height, down / height)
 
     def _on_scroll(self, _: object, right: float, up: float) -> None:
-        self.camera = self.camera.zoom(ZOOM_STEP**up)
+        if self.taker is None or not self.taker.scroll(right, up):
+            self.camera = self.camera.zoom(ZOOM_STEP**up)
 
     def _on_resize(self, _: object, width: int, height: int) -> None:
         self._events.append(Resized((max(width, 1), max(height, 1))))
@@ -205,6 +275,20 @@ def leave_windows() -> None:
     if _windows:
         nothing: Any = None  # which glfw takes, though its types do not say so
         glfw.make_context_current(nothing)
+
+
+def _monitor_under(place: tuple[int, int, int, int]) -> Any:
+    """The screen that holds most of a window at (left, top, width, height); None without any."""
+    left, top, width, height = place
+
+    def shared(monitor: Any) -> int:
+        x, y = glfw.get_monitor_pos(monitor)
+        size = glfw.get_video_mode(monitor).size
+        across = min(left + width, x + size.width) - max(left, x)
+        down = min(top + height, y + size.height) - max(top, y)
+        return max(across, 0) * max(down, 0)
+
+    return max(glfw.get_monitors(), key=shared, default=None)
 
 
 def _open_window(title: str, size: tuple[int, int], hints: Mapping[int, bool]) -> Any:

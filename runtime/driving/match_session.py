@@ -13,12 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.skeleton import SkeletonFrame
+from runtime.driving.choices import Choices
 from runtime.driving.driver import DrivenPart
 from runtime.driving.drivers import DriverFactory
 from runtime.driving.mapping import Mapping
 from runtime.driving.performer import Performer, Pose, Rest, rest_state
 from runtime.driving.polyline_driver import PolylineDriver
-from runtime.driving.puppet_match import Choices, PuppetMatch, PuppetMatchState
+from runtime.driving.puppet_match import PuppetMatch, PuppetMatchState
 from runtime.driving.reach import Reach
 from runtime.puppet.puppet import Puppet
 from solvers.retarget.limb_shapes import most_different_poses
@@ -38,14 +39,16 @@ class MatchSessionState:
     """The state of a `MatchSession` between two frames.
 
     Attributes:
-        matching: whether a match is looked for.
-        since: [s] when the match shown was shown first; NaN if no pose is struck.
+        kept: (J, 3) [m] the pose that the performer keeps; None if no pose is struck.
+        since: [s] since when it is kept and the same matches are shown.
+        now: [s] time of the last frame.
         before: the performer's last pose.
         matches: of each puppet.
     """
 
-    matching: bool
+    kept: Array | None
     since: float
+    now: float
     before: Pose | None
     matches: tuple[PuppetMatchState, ...]
 
@@ -65,7 +68,7 @@ class MatchSession:
         make_driver: makes the driver of each puppet.
 
     Attributes:
-        matching: whether a match is still looked for.
+        selected: the puppet that the actions on the matching are for; None for all.
     """
 
     def __init__(
@@ -78,10 +81,10 @@ class MatchSession:
         *,
         make_driver: DriverFactory = PolylineDriver,
     ) -> None:
-        self.matching = True
+        self.selected: int | None = None
         self._performer = performer
         self._view = view
-        self._patience = choices.patience
+        self._stray = choices.stray
         source = simplify(performer.rest_tree())
         self._matches = [
             PuppetMatch(
@@ -94,19 +97,43 @@ class MatchSession:
             )
             for puppet, mapping in zip(puppets, by_hand, strict=True)
         ]
-        self._since = float("nan")
+        self._kept: Array | None = None
+        self._since = self._now = 0.0
         self._before: Pose | None = None
 
     def snapshot(self) -> MatchSessionState:
         """Return what is remembered between frames; puppets and performer have their own."""
         matches = tuple(match.snapshot() for match in self._matches)
-        return MatchSessionState(self.matching, self._since, self._before, matches)
+        return MatchSessionState(self._kept, self._since, self._now, self._before, matches)
 
     def restore(self, state: MatchSessionState) -> None:
         """Go back to a snapshot."""
-        self.matching, self._since, self._before = state.matching, state.since, state.before
+        self._kept, self._since, self._now = state.kept, state.since, state.now
+        self._before = state.before
         for match, own in zip(self._matches, state.matches, strict=True):
             match.restore(own)
+
+    @property
+    def matching(self) -> bool:
+        """Whether a match is looked for, for any puppet."""
+        return any(match.matching for match in self._matches)
+
+    @property
+    def countdown(self) -> float | None:
+        """[s] until what is shown performs by itself, if the performer keeps still.
+
+        Infinite where it waits to be accepted; None while no pose is struck, or none is looked for.
+        """
+        sought = self._sought
+        if not sought or self._kept is None or not all(match.can_perform for match in sought):
+            return None
+        patience = max(match.patience for match in sought)
+        return max(patience - (self._now - self._since), 0.0)
+
+    @property
+    def matches(self) -> Sequence[PuppetMatch]:
+        """The match of each puppet."""
+        return self._matches
 
     @property
     def mappings(self) -> list[Mapping]:
@@ -151,7 +178,6 @@ class MatchSession:
         states = [rest_state(poses[index], heading=0.0) for index in evenly]
         for match in self._matches:
             match.rehearse(clip, states, view)
-        self.matching = False
         facing = np.array([pose.facing(0.0) - pose.hips for pose in poses])
         tried = [poses[index] for index in most_different_poses(facing, TRIED)]
         placed = [poses[index] for index in _evenly(len(poses), PLACED)]
@@ -159,19 +185,22 @@ class MatchSession:
 
     def direct(self, frame: SkeletonFrame) -> None:
         """While matching, show the best match of the newest pose; accept it in time."""
+        self._now = frame.time
         pose = self._performer.pose
         if pose is not None:
             self._turn_over(pose)
-        if not self.matching or pose is None:
+        sought = self._sought
+        if not sought or pose is None:
             return
         if not self.sees(frame):
-            self._since = float("nan")  # a performer who comes back strikes a pose anew
+            self._kept = None  # a performer who comes back strikes a pose anew
             return
         view = self._view()
-        changed = [match.match(pose.seen, frame.time, view) for match in self._matches]
-        if any(changed) or np.isnan(self._since):
-            self._since = frame.time
-        if frame.time - self._since >= self._patience:
+        changed = [match.match(pose.seen, frame.time, view) for match in sought]
+        moved = any(match.needs_stillness for match in sought) and self._has_moved(pose.seen)
+        if any(changed) or moved or self._kept is None or frame.time < self._since:
+            self._kept, self._since = pose.seen, frame.time
+        if self.countdown == 0.0:
             self.accept()
 
     def drive_with(self, make_driver: DriverFactory) -> None:
@@ -184,23 +213,25 @@ class MatchSession:
             match.switch(make_driver, self._view())
 
     def accept(self) -> None:
-        """Let the matches shown perform from now on; the pose just struck is the rest state."""
-        pose = self._performer.pose
-        if pose is None or not all(match.can_perform for match in self._matches):
-            return
-        rest = rest_state(pose)
-        for match in self._matches:
-            match.perform(rest, self._view())
-        self.matching = False
+        """Let what is shown perform from now on; the pose just struck is the rest state.
+
+        Puppets that nothing is looked for go on as they perform.
+        """
+        self._perform(self._sought)
 
     def take_rest(self) -> None:
         """Take the pose just struck as the rest state, whether a match is looked for or not."""
-        self.accept()
+        self._perform(self._chosen)
+
+    def keep(self) -> None:
+        """Stop looking for matches; puppets that performed before go on as they do."""
+        for match in self._chosen:
+            match.keep()
 
     def calibrate(self) -> None:
         """Take the pose just struck as the rest state, and measure floor and sizes anew."""
         self._performer.recalibrate()
-        self.accept()
+        self.take_rest()
 
     def _turn_over(self, pose: Pose) -> None:
         """Adapt the rest states where left-right exchange or the scale was switched."""
@@ -215,10 +246,13 @@ class MatchSession:
                 match.restate(rest, self._view())
 
     def match_again(self) -> None:
-        """Return to matching, by the pose alone, whatever was stepped to by hand."""
-        for match in self._matches:
-            match.release(self._view())
-        self._return_to_matching()
+        """Return to matching, by the pose alone, whatever was stepped to by hand.
+
+        What performs goes on until what is shown is accepted; so it does while stepping.
+        """
+        self._kept = None
+        for match in self._chosen:
+            match.match_again(self._view())
 
     def next_match(self) -> None:
         """Show the match after the one shown, and stay there; also in the midst of performing."""
@@ -228,17 +262,37 @@ class MatchSession:
         """Show the match before the one shown, and stay there; also in the midst of performing."""
         self._step(-1)
 
-    def _step(self, ranks: int) -> None:
-        for match in self._matches:
-            match.step(ranks, self._view())
-        if not self.matching:
-            self._return_to_matching()
+    @property
+    def _chosen(self) -> list[PuppetMatch]:
+        """The puppets that actions are for."""
+        return self._matches if self.selected is None else [self._matches[self.selected]]
 
-    def _return_to_matching(self) -> None:
-        self.matching = True
-        self._since = float("nan")
-        for match in self._matches:
-            match.stop()
+    @property
+    def _sought(self) -> list[PuppetMatch]:
+        """The puppets that a match is looked for."""
+        return [match for match in self._matches if match.matching]
+
+    def _step(self, ranks: int) -> None:
+        self._kept = None
+        for match in self._chosen:
+            match.step(ranks, self._view())
+
+    def _perform(self, matches: Sequence[PuppetMatch]) -> None:
+        pose = self._performer.pose
+        if pose is None or not all(match.can_perform for match in matches):
+            return
+        rest = rest_state(pose)
+        for match in matches:
+            match.perform(rest, self._view())
+
+    def _has_moved(self, positions: Array) -> bool:
+        """Whether a driving joint is far from where it was when the pose was struck."""
+        if self._kept is None or self._stray == np.inf:
+            return False
+        joints = self._performer.joints
+        kept, now = self._kept[joints], positions[joints]
+        size = float(np.ptp(kept, axis=0).max())
+        return bool(np.linalg.norm(now - kept, axis=1).max() > self._stray * size)
 
 
 def _evenly(count: int, most: int) -> list[int]:

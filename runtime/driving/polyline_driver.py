@@ -139,6 +139,7 @@ class PolylineDriver(MappedDriver):
         self.gains = np.ones(0)
         self._view = STRAIGHT_ON
         self._performer = pairing.performer
+        self._performer_plan = plan_by_names(pairing.performer)
         self._legs = legs_of(pairing.performer)
         self._character = pairing.character
         self._skeleton = pairing.skeleton
@@ -253,7 +254,7 @@ class PolylineDriver(MappedDriver):
         gains = self.gains if len(self.gains) else np.ones(len(self.mapping.drives))
         return [
             DrivenPart(
-                part_name(performer, plan_by_names(performer), drive.source),
+                part_name(performer, self._performer_plan, drive.source),
                 part_name(character.skeleton, character.plan, drive.target),
                 drive.source,
                 drive.target,

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.errors import InputError
+from runtime.driving.choices import Candidate, Choices
 from runtime.driving.driver import DrivenPart, Driver, MappedDriver
 from runtime.driving.drivers import DriverFactory, best_driver, matched_driver
 from runtime.driving.mapping import Drive, Mapping
@@ -24,26 +25,9 @@ from solvers.retarget.match_hysteresis import MatchHysteresis, MatchHysteresisSt
 from solvers.retarget.source_limbs import SimplifiedSource
 
 CANDIDATES = 20  # matches that can be cycled through
+OF_ANATOMY = 1.0  # [s] at most that a performer is seen before the anatomy's choice performs
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True)
-class Choices:
-    """The settings of the matching that a puppeteer can choose.
-
-    Attributes:
-        rank: which match is shown first, 1 the best.
-        extend: drive a chain on to its longest leaf, or stop at the sub-tree's root (figure 5).
-        flip: turn the targets' y-axes round (section 5.2).
-        patience: seconds that a match must be shown before it performs by itself; 0 at once,
-            infinite only when accepted.
-    """
-
-    rank: int = 1
-    extend: bool = True
-    flip: bool = False
-    patience: float = 0.0
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -53,14 +37,21 @@ class PuppetMatchState:
     Attributes:
         rest: the performer's rest state.
         hysteresis: of the match shown.
+        matching: whether a match is looked for.
+        proposes: whether a driver is proposed in place of the one that moves the puppet.
     """
 
     rest: Rest | None
     hysteresis: MatchHysteresisState
+    matching: bool
+    proposes: bool
 
 
 class PuppetMatch:
     """Matches one puppet to a performer, and prepares the puppet's driver.
+
+    A puppet that performs goes on while another match is looked for: what is shown is then the
+    driver that is proposed, which moves the puppet once it is accepted.
 
     Args:
         performer: the performer whose poses are matched.
@@ -73,6 +64,7 @@ class PuppetMatch:
     Attributes:
         puppet: see above.
         rest: the performer's rest state; None while the puppet is not driven.
+        matching: whether a match is looked for.
     """
 
     def __init__(
@@ -94,37 +86,66 @@ class PuppetMatch:
         self._hierarchy.rank(source, STRAIGHT_ON, limit=1)  # so that no frame waits for a compiler
         self._hysteresis = MatchHysteresis(choices.rank - 1)
         self._make_driver = make_driver
+        self._anatomy_first = make_driver is best_driver
+        self.matching = True
         self._driver = self._make(make_driver)
+        self._proposal: Driver | None = None
         puppet.drive_with(self._driver)
 
     def snapshot(self) -> PuppetMatchState:
         """Return what is remembered between frames."""
-        return PuppetMatchState(self.rest, self._hysteresis.snapshot())
+        proposes = self._proposal is not None
+        return PuppetMatchState(self.rest, self._hysteresis.snapshot(), self.matching, proposes)
 
     def restore(self, state: PuppetMatchState) -> None:
         """Go back to a snapshot; the puppet's own brings the driver back."""
-        self.rest = state.rest
+        self.rest, self.matching = state.rest, state.matching
         self._hysteresis.restore(state.hysteresis)
+        self._propose(self._make(self._make_driver) if state.proposes else None)
 
     @property
     def mapping(self) -> Mapping:
-        """The mapping that drives the puppet or is shown; one without drives if there is none."""
-        return self._driver.mapping if isinstance(self._driver, MappedDriver) else Mapping(())
+        """The mapping that is shown, or else drives the puppet; without drives if there is none."""
+        return self._shown.mapping if isinstance(self._shown, MappedDriver) else Mapping(())
 
     @property
     def parts(self) -> Sequence[DrivenPart]:
-        """What drives what, in words and numbers."""
-        return self._driver.parts
+        """What drives what, in words and numbers; as it is shown while a match is looked for."""
+        return self._shown.parts
+
+    @property
+    def candidate(self) -> Candidate | None:
+        """The match that is shown; None where the anatomy chooses, or no pose was struck."""
+        if not isinstance(self._shown, MappedDriver) or not self.mapping.drives:
+            return None
+        rank, count = self._hysteresis.place
+        return Candidate(rank, count, self.mapping.score)
+
+    @property
+    def patience(self) -> float:
+        """[s] that the performer must keep still before what is shown performs by itself."""
+        first, again = self._choices.patience, self._choices.again
+        own = first if self.rest is None or again is None else again
+        return own if isinstance(self._shown, MappedDriver) else min(own, OF_ANATOMY)
+
+    @property
+    def needs_stillness(self) -> bool:
+        """Whether the pose chooses what is shown, so that it must be kept still."""
+        return isinstance(self._shown, MappedDriver)
 
     @property
     def needs_clip(self) -> bool:
         """Whether the driver needs the whole clip before the first frame."""
-        return self._driver.needs.clip
+        return self._shown.needs.clip
 
     @property
     def can_perform(self) -> bool:
-        """Whether the driver has what it needs to start."""
-        return not isinstance(self._driver, MappedDriver) or bool(self._driver.mapping.drives)
+        """Whether what is shown has what it needs to start."""
+        return not isinstance(self._shown, MappedDriver) or bool(self._shown.mapping.drives)
+
+    @property
+    def _shown(self) -> Driver:
+        return self._driver if self._proposal is None else self._proposal
 
     def match(self, positions: Array, time: float, view: Array) -> bool:
         """Show the mapping for a pose; return whether another one was shown before.
@@ -137,28 +158,35 @@ class PuppetMatch:
         Raises:
             InputError: there is no match of the rank that was chosen.
         """
-        if not isinstance(self._driver, MappedDriver):
+        shown = self._shown
+        if not isinstance(shown, MappedDriver):
             return False
-        before = self._driver.mapping.drives
+        before = shown.mapping.drives
         mapping = self._choose(self._hysteresis, positions, time, view)
-        self._driver.show(mapping, view)
+        shown.show(mapping, view)
         return mapping.drives != before
 
     def perform(self, rest: Rest, view: Array) -> None:
-        """Let the mapping shown drive the puppet, from this rest state on.
+        """Let what is shown drive the puppet, from this rest state on.
 
         Raises:
-            InputError: the mapping cannot drive this character, or the driver needs a recording.
+            InputError: it cannot drive this character, or the driver needs a recording. What drove
+                the puppet before goes on.
         """
-        if self._driver.needs.clip and not self._clip:
+        shown = self._shown
+        if shown.needs.clip and not self._clip:
             raise InputError(
                 f"the driver of {self.puppet.character.name} needs the whole motion before its "
                 "first frame: replay a recording, or choose a driver that follows a live stream"
             )
-        if isinstance(self._driver, MappedDriver):
-            self._driver.show(self._driver.mapping, view)
-        self._driver.prepare(self._clip, rest)
-        self.rest = rest
+        if isinstance(shown, MappedDriver):
+            shown.show(shown.mapping, view)
+        shown.prepare(self._clip, rest)
+        if shown is not self._driver:
+            self._driver = shown
+            self.puppet.drive_with(shown)
+            self._propose(None)
+        self.rest, self.matching = rest, False
 
     def restate(self, rest: Rest, view: Array) -> None:
         """Go on from another rest state for the same mapping, with the same turn limits."""
@@ -206,28 +234,50 @@ class PuppetMatch:
             self.puppet.forget()
         return reach_of(self._driver, self.puppet.root, around, poses)
 
-    def stop(self) -> None:
-        """Stop driving the puppet, which goes back to its rest pose; the mapping stays shown."""
-        self._driver.prepare((), None)
-        self.puppet.rest()
-        self.rest = None
+    def match_again(self, view: Array) -> None:
+        """Look for a match by the pose alone, or by the anatomy, whatever was stepped to by hand.
+
+        A puppet that performs goes on until what is shown is accepted.
+        """
+        self._hysteresis.release()
+        if self._anatomy_first:
+            self._make_driver = best_driver
+        self._look_again(view)
 
     def step(self, ranks: int, view: Array) -> None:
         """Show the match so many ranks after the one shown, and stay there.
 
         Where the anatomy had chosen, the first step shows the best match: the user's choice beats
-        both.
+        both. A puppet that performs goes on until what is shown is accepted.
         """
-        if self._make_driver is best_driver and not isinstance(self._driver, MappedDriver):
-            self.switch(matched_driver, view)
+        if self._anatomy_first and self._make_driver is best_driver and not self.mapping.drives:
+            self._make_driver = matched_driver
+            self._look_again(view)
             return
         self._hysteresis.cycle(ranks)
+        if not self.matching:
+            self._look_again(view)
 
-    def release(self, view: Array) -> None:
-        """Let the pose alone choose the match again, or the anatomy."""
-        self._hysteresis.release()
-        if self._make_driver is best_driver:
-            self.switch(best_driver, view)
+    def keep(self) -> None:
+        """Stop looking for a match; the puppet goes on as it performs."""
+        if self.rest is not None:
+            self.matching = False
+            self._propose(None)
+
+    def _look_again(self, view: Array) -> None:
+        """Look for a match with a new driver, which shows what is shown now, if anything is."""
+        shown, mapping = self._make(self._make_driver), self.mapping
+        if isinstance(shown, MappedDriver) and mapping.drives:
+            shown.show(mapping, view)
+        self.matching = True
+        if self.rest is None:
+            self._driver = shown
+            self.puppet.drive_with(shown)
+        else:
+            self._propose(shown)
+
+    def _propose(self, driver: Driver | None) -> None:
+        self._proposal = self.puppet.proposal = driver
 
     def switch(self, make_driver: DriverFactory, view: Array) -> None:
         """Let another driver move the puppet from the next pose on, from the same rest state.
@@ -238,6 +288,7 @@ class PuppetMatch:
         Raises:
             InputError: the new driver cannot drive this puppet; the old one goes on.
         """
+        self._propose(None)
         before, driver = self._driver, self._make(make_driver)
         if isinstance(driver, MappedDriver):
             mapping = self.mapping

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from runtime.characters.character import Character
 from runtime.characters.proxy import proxy_of
-from runtime.driving.driver import Driver, Highlight
+from runtime.driving.driver import Driver, Highlight, MappedDriver
 from runtime.driving.performer import Pose
 from runtime.driving.targets import HandleTargets, PosedNodes, SkinnedTargets, Targets
 from runtime.puppet.bound_skeleton import BoundSkeleton
@@ -80,6 +80,7 @@ class Puppet:
         bound_skeleton: the character's skeleton, bound to its surface.
         surface: the character's surface.
         driver: what moves it; None before the first one.
+        proposal: a driver that is proposed in its place, and lights up instead; None without one.
         travel: how much of its way over the stage it goes.
         face: its morph targets, which follow the performer's blend shapes.
     """
@@ -100,6 +101,7 @@ class Puppet:
             proxy, skeleton.handles, skeleton.stiff_segments, energy=energy
         )
         self.driver: Driver | None = None
+        self.proposal: Driver | None = None
         self.travel = Travel()
         self.face = Face(character, tell)
         self._targets = skeleton.at_rest
@@ -191,11 +193,17 @@ class Puppet:
 
     @property
     def highlights(self) -> list[Highlight]:
-        """The driver's highlights, on the stage."""
-        if self.driver is None:
+        """The highlights of the driver that is proposed, or else of the one that moves it."""
+        place, nodes = self._stance.place, self._targets.nodes
+        driver = self.driver if self.proposal is None else self.proposal
+        if isinstance(self.proposal, MappedDriver) and nodes is not None:
+            return [  # on the character as it is now, which another driver moves
+                Highlight(place(nodes.positions[list(drive.target)]), drive.source[1:])
+                for drive in self.proposal.mapping.drives
+            ]
+        if driver is None:
             return []
-        place = self._stance.place
-        return [replace(each, points=place(each.points)) for each in self.driver.highlights]
+        return [replace(each, points=place(each.points)) for each in driver.highlights]
 
     @property
     def _before_shown(self) -> int:

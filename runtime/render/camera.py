@@ -13,6 +13,7 @@ Matrix = NDArray[np.float64]
 DEFAULT_PITCH = math.radians(8.0)
 HIGHEST_PITCH = math.radians(80.0)
 HEADROOM = 0.42  # where boxes stand in spare height: 0 in the middle, 1 at the bottom
+NEAREST, FARTHEST = 0.3, 60.0  # [m] from the target that a zoom goes
 LOWEST_PITCH = math.radians(1.0)  # the eye stays above the floor
 
 
@@ -112,8 +113,8 @@ class Camera:
         return _placed(self, target + factor * np.subtract(self.eye, self.target), target)
 
     def zoom(self, factor: float) -> Camera:
-        """Return a camera `factor` times closer to the target."""
-        distance = min(max(self.distance / factor, 0.05), 500.0)
+        """Return a camera `factor` times closer to the target, within limits."""
+        distance = min(max(self.distance / factor, NEAREST), FARTHEST)
         back = np.subtract(self.eye, self.target) / self.distance
         return _placed(self, np.asarray(self.target) + distance * back, self.target)
 

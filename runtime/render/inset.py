@@ -171,6 +171,11 @@ def _skeleton_tubes(
     return np.vstack([glow, solid[np.argsort(depth, kind="stable")]])
 
 
+def inset_side(size: tuple[int, int]) -> float:
+    """The side [px] of the square in the upper left of a picture of `size` that the inset takes."""
+    return 2.32 * max(round(0.165 * min(size)), 8)
+
+
 class InsetPainter:
     """Draws an inset's disc and skeleton into a corner of the bound framebuffer."""
 
@@ -183,7 +188,7 @@ class InsetPainter:
     ) -> None:
         """Draw at the upper left; the diameter is a third of the picture's height."""
         width, height = target.size
-        radius = max(round(0.165 * min(height, width)), 8)
+        radius = round(inset_side(target.size) / 2.32)
         centre = (radius * 1.16, height - radius * 1.16)
         corner = int(centre[0] - radius * 1.16), int(centre[1] - radius * 1.16)
         target.scissor = (*corner, int(radius * 2.5), int(radius * 2.32) + 1)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 from devices.skeleton import SkeletonFrame
 from runtime.driving.match_session import MatchSession, MatchSessionState
@@ -73,6 +72,11 @@ class Act:
         if not frozen:
             self.match_session.direct(frame)
 
+    def match_again_at(self, frame: SkeletonFrame) -> None:
+        """Look for matches once more by the last pose, at its frame."""
+        if self.pose is not None:
+            self.match_session.direct(frame)
+
     def freeze(self, time: float) -> None:
         """Keep the characters frozen at `time` [s]."""
         self._unfreeze_blend.freeze(time)
@@ -84,77 +88,84 @@ class Act:
         return self._unfreeze_blend.follow(self.pose, time, self.match_session.rests)
 
 
-class MatchControls(Protocol):
-    """The actions of a puppeteer on the matching; see `MatchSession`."""
+class ActGroup:
+    """Passes each action on the matching to the acts of the characters that are selected.
+
+    Args:
+        acts: each performer with their puppets, from left to right on the stage.
+    """
+
+    def __init__(self, acts: Sequence[Act]) -> None:
+        self._acts = acts
+        self._selected: int | None = None
 
     @property
-    def matching(self) -> bool:
-        """Whether a match is still looked for."""
-        ...
+    def selected(self) -> int | None:
+        """The number of the character that actions are for, from 0; None for all."""
+        return self._selected
 
-    def accept(self) -> None:
-        """Let the matches shown perform; the pose just struck is the rest state."""
-        ...
+    def select(self, number: int | None) -> None:
+        """Select one character for the actions that follow, or all; ignore a number too high."""
+        if number is not None and number >= sum(len(act.puppets) for act in self._acts):
+            return
+        self._selected, first = number, 0
+        for act in self._acts:
+            count = len(act.puppets)
+            own = None if number is None or not 0 <= number - first < count else number - first
+            act.match_session.selected = own
+            first += count
 
-    def take_rest(self) -> None:
-        """Take the pose just struck as the rest state."""
-        ...
-
-    def calibrate(self) -> None:
-        """Take the pose just struck as the rest state, and measure floor and sizes anew."""
-        ...
-
-    def match_again(self) -> None:
-        """Return to matching."""
-        ...
-
-    def next_match(self) -> None:
-        """Show the match after the one shown."""
-        ...
-
-    def previous_match(self) -> None:
-        """Show the match before the one shown."""
-        ...
-
-
-class ActGroup:
-    """Passes each action on the matching to the match sessions of all acts."""
-
-    def __init__(self, match_sessions: Sequence[MatchSession]) -> None:
-        self._match_sessions = match_sessions
+    @property
+    def puppets(self) -> list[Puppet]:
+        """The puppets that actions are for."""
+        every = [puppet for act in self._acts for puppet in act.puppets]
+        return every if self._selected is None else [every[self._selected]]
 
     @property
     def matching(self) -> bool:
         """Whether a match is still looked for in any act."""
-        return any(match_session.matching for match_session in self._match_sessions)
+        return any(act.match_session.matching for act in self._acts)
 
     def accept(self) -> None:
-        """See `MatchSession.accept`; acts that perform already go on."""
-        for match_session in self._match_sessions:
-            if match_session.matching:
-                match_session.accept()
+        """See `MatchSession.accept`."""
+        for match_session in self._sessions:
+            match_session.accept()
+
+    def keep(self) -> None:
+        """See `MatchSession.keep`."""
+        for match_session in self._sessions:
+            match_session.keep()
 
     def take_rest(self) -> None:
         """See `MatchSession.take_rest`."""
-        for match_session in self._match_sessions:
+        for match_session in self._sessions:
             match_session.take_rest()
 
     def calibrate(self) -> None:
         """See `MatchSession.calibrate`."""
-        for match_session in self._match_sessions:
+        for match_session in self._sessions:
             match_session.calibrate()
 
     def match_again(self) -> None:
         """See `MatchSession.match_again`."""
-        for match_session in self._match_sessions:
+        for match_session in self._sessions:
             match_session.match_again()
 
     def next_match(self) -> None:
         """See `MatchSession.next_match`."""
-        for match_session in self._match_sessions:
+        for match_session in self._sessions:
             match_session.next_match()
 
     def previous_match(self) -> None:
         """See `MatchSession.previous_match`."""
-        for match_session in self._match_sessions:
+        for match_session in self._sessions:
             match_session.previous_match()
+
+    @property
+    def _sessions(self) -> list[MatchSession]:
+        """Those of the characters that are selected."""
+        return [
+            act.match_session
+            for act in self._acts
+            if self._selected is None or act.match_session.selected is not None
+        ]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from devices.skeleton import SkeletonFrame
 from devices.stream import SkeletonStream
 from runtime.conditioning.reception import Reception, ReceptionState
+from runtime.conditioning.silence import Silence, SilenceState
 from runtime.conditioning.switches import Conditioning, filled_only
 from runtime.show.performer_slots import PerformerSlots, PerformerSlotsState
 
@@ -18,12 +19,15 @@ class Arrived:
 
     Attributes:
         newest: the frame whose time is the show's; None if none came.
-        of_slots: for each slot whose performer was seen the newest frame.
+        of_slots: for each slot whose performer was seen the newest frame; for one whose performer
+            has gone silent a frame in which nothing is seen.
+        came: frames that came.
         dropped: frames that came and are not performed.
     """
 
     newest: SkeletonFrame | None
     of_slots: Mapping[int, SkeletonFrame]
+    came: int
     dropped: int
 
 
@@ -33,6 +37,7 @@ class ArrivalsState:
 
     reception: ReceptionState
     performer_slots: PerformerSlotsState
+    silence: SilenceState
     count: int
 
 
@@ -55,28 +60,42 @@ class Arrivals:
         self._stream = stream
         self._reception = Reception(stream.skeleton, conditioning or filled_only())
         self._performer_slots = PerformerSlots(slots)
+        self._silence = Silence(slots)
 
     def snapshot(self) -> ArrivalsState:
         """Return what is remembered between frames."""
-        slots = self._performer_slots.snapshot()
-        return ArrivalsState(self._reception.snapshot(), slots, self.count)
+        return ArrivalsState(
+            self._reception.snapshot(),
+            self._performer_slots.snapshot(),
+            self._silence.snapshot(),
+            self.count,
+        )
 
     def restore(self, state: ArrivalsState) -> None:
         """Go back to a snapshot."""
         self._reception.restore(state.reception)
         self._performer_slots.restore(state.performer_slots)
+        self._silence.restore(state.silence)
         self.count = state.count
 
-    def poll(self) -> Arrived:
-        """Return what came since the last call."""
+    def poll(self, silence: float = 0.0) -> Arrived:
+        """Return what came since the last call.
+
+        Args:
+            silence: [s] since the newest frame came; 0 where frames may pause, as in a recording.
+        """
         came = self._stream.poll()
         frames = self._reception.receive(came)
-        of_slots = {}
+        of_slots: dict[int, SkeletonFrame] = {}
         for frame in frames:
             slot = self._performer_slots.slot(frame)
             if slot is not None:
                 of_slots[slot] = frame
         newest = of_slots.get(0, next(iter(of_slots.values()), frames[-1] if frames else None))
         self.count += len(came)
-        performed = max(len(of_slots), min(len(frames), 1))
-        return Arrived(newest, of_slots, len(came) - performed)
+        dropped = len(came) - max(len(of_slots), min(len(frames), 1))
+        now = self._silence.newest_time + silence if newest is None else newest.time
+        unseen = self._silence.unseen(of_slots, now)
+        if newest is None and unseen:
+            newest = next(iter(unseen.values()))
+        return Arrived(newest, {**of_slots, **unseen}, len(came), dropped)

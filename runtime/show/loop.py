@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 from devices.skeleton import SkeletonFrame
 from devices.stream import SkeletonStream
 from runtime.conditioning.switches import Conditioning
+from runtime.driving.performer import Pose
 from runtime.output.output import Output, PerformedFrame
 from runtime.output.report.report import Report
 from runtime.puppet.puppet import Motion
@@ -23,6 +24,7 @@ from runtime.show.arrivals import Arrivals, ArrivalsState
 from runtime.show.clock import StageTimer
 from runtime.show.picture_schedule import PictureSchedule
 from runtime.show.scene import Scene
+from runtime.status.stream_watch import StreamWatch
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -62,6 +64,7 @@ class FrameLoop:
         outputs: for each puppet, what writes its performance.
         conditioning: how the stream is put in order; as it comes if None.
         shown: whether a window shows every tick.
+        watch: knows how long a live stream has been silent; None where silence is no matter.
         clock: host monotonic time [s].
 
     Attributes:
@@ -84,6 +87,7 @@ class FrameLoop:
         outputs: Sequence[Sequence[Output]],
         conditioning: Conditioning | None = None,
         shown: bool = False,
+        watch: StreamWatch | None = None,
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
         self.frozen = False
@@ -92,6 +96,7 @@ class FrameLoop:
         self.latency = math.nan
         self._began = math.nan
         self._arrivals = Arrivals(stream, len(acts), conditioning)
+        self._watch = watch
         self._acts = acts
         self._report = report
         self._scene = scene
@@ -102,6 +107,8 @@ class FrameLoop:
         self._timer = StageTimer()
         self.motions = [puppet.deform() for act in acts for puppet in act.puppets]
         self._unsettled = False
+        self._outdated = False
+        self._last: SkeletonFrame | None = None
 
     @property
     def received(self) -> int:
@@ -118,13 +125,16 @@ class FrameLoop:
         self._timer.reset()
         with self._timer.stage("frame"):
             with self._timer.stage("poll"):
-                arrived = self._arrivals.poll()
+                arrived = self._arrivals.poll(0.0 if self._watch is None else self._watch.silence)
                 self._report.dropped += arrived.dropped
+                if self._watch is not None and arrived.came:
+                    self._watch.note()
             if arrived.newest is not None:
                 self._perform(arrived.newest, arrived.of_slots)
                 self._publish(arrived.newest)
                 self._count(arrived.newest)
             else:
+                self._revise()
                 self._pictures.idle(self.draw)
         if arrived.newest is None:
             return False
@@ -188,6 +198,10 @@ class FrameLoop:
                 for puppet in act.puppets:
                     puppet.settle()
 
+    def perform_again(self) -> None:
+        """Perform the last poses anew where no frame comes, as after an action in a pause."""
+        self._outdated = True
+
     def hurry(self) -> None:
         """Leave the surfaces as they were shown: there is no time to settle them."""
         self._unsettled = False
@@ -195,11 +209,20 @@ class FrameLoop:
     def draw(self) -> None:
         """Draw what was performed last, where there is a scene."""
         if self._scene is not None:
-            self._scene.show(self._acts[0].pose, self.motions)
+            self._scene.show(self._pose_in_focus(self._scene.focus), self.motions)
+
+    def _pose_in_focus(self, number: int) -> Pose | None:
+        """The pose of the performer who drives the puppet with this number."""
+        for act in self._acts:
+            if number < len(act.puppets):
+                return act.pose
+            number -= len(act.puppets)
+        return None
 
     def _perform(self, frame: SkeletonFrame, of_slots: Mapping[int, SkeletonFrame]) -> None:
         timer = self._timer
         motions: list[Motion] = []
+        self._last, self._outdated = frame, False
         for slot, act in enumerate(self._acts):
             if slot in of_slots:
                 with timer.stage("match"):
@@ -220,6 +243,15 @@ class FrameLoop:
             self._unsettled = True
         if self._scene is not None:
             self._scene.follow(frame.time)
+
+    def _revise(self) -> None:
+        """Perform the last poses anew, if an action may have changed what they look like."""
+        frame, outdated, self._outdated = self._last, self._outdated, False
+        if frame is None or not outdated or self.frozen:
+            return
+        for act in self._acts:
+            act.match_again_at(frame)
+        self._perform(frame, {})
 
     def _count(self, frame: SkeletonFrame) -> None:
         self._began = frame.time if self.frames == 0 else self._began

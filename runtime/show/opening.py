@@ -16,15 +16,14 @@ from replay.recorder import Recorder
 from replay.recording import Recording
 from runtime.characters.character import Character
 from runtime.conditioning.switches import asked_for, for_live, for_recording
-from runtime.control.actions import ShowControls
 from runtime.control.keys import WindowControls
 from runtime.control.remote import PORT, Remote
+from runtime.control.show_controls import ShowControls
 from runtime.control.window import Window, leave_windows
 from runtime.driving.drivers import DRIVERS, LIMB_BY_LIMB, DriverFactory, matched_driver
 from runtime.driving.mapping import read_mapping
 from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer
-from runtime.driving.puppet_match import Choices
 from runtime.driving.rehearsal import rehearse
 from runtime.output.files.export import OF_NODES
 from runtime.output.files.kept_file import Kept, KeptFile, size_of
@@ -37,24 +36,29 @@ from runtime.render.context import headless_context, make_current, release_headl
 from runtime.show.act_group import Act, ActGroup
 from runtime.show.interrupts import interrupts_deferred
 from runtime.show.loop import FrameLoop
+from runtime.show.match_choices import choices_of
 from runtime.show.outputs import check_outputs, open_outputs
 from runtime.show.pacing import TICKS, loses_no_frame
 from runtime.show.provenance import provenance
 from runtime.show.scene import Scene
 from runtime.show.settings import CharacterSettings, MatchSettings, ShowSettings
 from runtime.show.takes import Takes, set_aside
+from runtime.status.notices import Notices, SecondPress
+from runtime.status.prompts import news
+from runtime.status.show_status import ShowStatus, status_of
+from runtime.status.stream_watch import StreamWatch
 
 if TYPE_CHECKING:
     import moderngl
 
-STEADY = 1.0  # [s] that a live match is shown before it performs by itself
+    from runtime.panel.panel import Panel
 
 
 class OpenedShow:
     """Everything that a `Show` opens; `closing` closes it, in reverse order.
 
     Args:
-        stream, characters, settings, outputs, context, make_scene, make_driver, clock,
+        stream, characters, settings, outputs, context, make_scene, make_driver, clock, tell,
             warn: as of `Show`.
         closing: closes what was opened, also if the constructor fails.
 
@@ -64,6 +68,8 @@ class OpenedShow:
         controls: the parts of the show that actions change.
         window_controls: the window's keys and mouse, or None without a window.
         remote: the remote control, or None.
+        notices: what happened last, for the panel.
+        watch: what is seen of the performer.
         report: the figures of the show.
         acts: each performer with their puppets and their match session.
         puppets: the characters as they are driven.
@@ -81,10 +87,13 @@ class OpenedShow:
         make_scene: Callable[..., Scene],
         make_driver: DriverFactory | None,
         clock: Callable[[], float],
+        tell: Callable[[str], None],
         warn: Callable[[str], None],
     ) -> None:
         self._settings, self._closing = settings, closing
-        self._clock, self._warn = clock, warn
+        self._clock = clock
+        self.notices = Notices(tell, warn, clock)
+        self._tell, self._warn = self.notices.tell, self.notices.warn
         self._source = stream
         self._stream = closing.enter_context(RecordedStream(stream))
         _check(characters, settings)
@@ -98,6 +107,7 @@ class OpenedShow:
         usual = for_live() if self._recording is None else for_recording()
         self._conditioning = asked_for(usual, settings.conditioning)
         first = self._performer()
+        self.watch = StreamWatch(stream, live=playback_of(stream) is None, clock=clock)
         self.report = Report(settings.files.report)
         self._parts = [self.report.add_character(character) for character in characters]
         own = settings.characters
@@ -115,7 +125,9 @@ class OpenedShow:
             self.controls = self._open_controls()
         self.window_controls = None
         if self._window is not None and self.scene is not None:
-            self.window_controls = WindowControls(self._window, self.scene, self.controls)
+            self.window_controls = WindowControls(
+                self._window, self.scene, self.controls, self._open_panel(self._window)
+            )
         closing.callback(self.make_current)  # for outputs that draw, and for the scene
 
     def make_current(self) -> None:
@@ -139,6 +151,16 @@ class OpenedShow:
         driven = [parts for session in sessions for parts in session.parts]
         for part, mapping, parts in zip(self._parts, mappings, driven, strict=True):
             part.matched(mapping.score, parts, skeleton)
+
+    def tell_sight(self) -> None:
+        """Tell when a live performer comes into view, is lost or comes back."""
+        changed = self.watch.changed() if self._recording is None else None
+        if changed is not None:
+            self._tell(news(*changed, self._origin))
+
+    @property
+    def _origin(self) -> str:
+        return self._settings.origin or type(self._source).__name__
 
     @property
     def kept(self) -> list[Kept]:
@@ -234,14 +256,13 @@ class OpenedShow:
         # Only a window's camera can be walked round the stage. A camera that merely steps back to
         # have all in view would turn by a rounding error, and the bytes of a cache with it.
         scene, front = (self.scene if self._window else None), front_camera()
-        patience = match.patience
-        if patience is None:
-            patience = STEADY if self._recording is None else 0.0
         return MatchSession(
             performer,
             puppets,
             lambda: (front if scene is None else scene.camera).view_rotation,
-            Choices(match.rank, match.extend, match.flip, patience),
+            choices_of(
+                match, recorded=self._recording is not None, attended=self._window is not None
+            ),
             [
                 None
                 if match.mapping is None
@@ -301,6 +322,7 @@ class OpenedShow:
             outputs=outputs,
             conditioning=self._conditioning,
             shown=self._shown,
+            watch=self.watch,
             clock=self._clock,
         )
         self._closing.callback(self.complete_report)
@@ -320,17 +342,39 @@ class OpenedShow:
 
     def _open_controls(self) -> ShowControls:
         return ShowControls(
-            match_controls=ActGroup([act.match_session for act in self.acts]),
+            match_controls=ActGroup(self.acts),
             conditioning=self._conditioning,
             loop=self.loop,
             puppets=self.puppets,
             takes=self._open_takes(),
+            notices=self.notices,
+            leave_asked=SecondPress(self._clock),
             playback=playback_of(self._stream),
             scene=self.scene,
         )
 
+    def _open_panel(self, window: Window) -> Panel:
+        from runtime.panel.panel import Panel  # noqa: PLC0415  # no headless show needs ImGui
+
+        panel = Panel(window.context, self.controls, self.status, clock=self._clock)
+        self._closing.callback(panel.close)
+        window.taker = panel.gui
+        return panel
+
+    def status(self) -> ShowStatus:
+        """Return the state of the show as it is now."""
+        controls = self.controls
+        return status_of(
+            self._origin,
+            self.watch,
+            self.acts,
+            self.loop,
+            controls.takes,
+            controls.playback,
+        )
+
     def _open_takes(self) -> Takes:
-        """Takes that may be started, and the recording that the settings ask for, started."""
+        """Takes that may be started, and the recording of the whole show that was asked for."""
         files = self._settings.files
         recorder = None
         if files.record is not None:
@@ -341,18 +385,17 @@ class OpenedShow:
             self._stream,
             files.takes or files.record or Path("take.mcap"),
             self._open_recorder,
-            tell=self._warn,
+            tell=self._tell,
+            warn=self._warn,
+            whole=recorder,
             waits=loses_no_frame(self._source),
             clock=self._clock,
         )
-        self._closing.enter_context(takes)
-        if recorder is not None:
-            takes.record(recorder)
-        return takes
+        return self._closing.enter_context(takes)
 
     def _open_recorder(self, path: Path) -> Recorder:
-        origin = self._settings.origin or type(self._source).__name__
-        return Recorder(path, self._stream.skeleton, source=provenance(origin), tell=self._warn)
+        source = provenance(self._origin)
+        return Recorder(path, self._stream.skeleton, source=source, tell=self._warn)
 
 
 def _driver(match: MatchSettings) -> DriverFactory:

@@ -21,7 +21,7 @@ from runtime.render.background import Background
 from runtime.render.camera import Camera, front_camera
 from runtime.render.frame import StageSet, stage_set
 from runtime.render.glide import SLACK, Glide, GlideState
-from runtime.render.inset import SkeletonInset, body_bones
+from runtime.render.inset import SkeletonInset, body_bones, inset_side
 from runtime.render.stage import Stage
 from runtime.render.tubes import PAIR_COLOURS
 
@@ -52,6 +52,7 @@ class Scene:
         camera: the view of the picture while the characters are at home; it glides after them,
             unless all that they do fits into one picture.
         highlights: whether the drivers' highlights are drawn.
+        focus: the number of the puppet whose colours the inset's performer has.
         blackout: 0 for light, 1 for black.
     """
 
@@ -82,6 +83,7 @@ class Scene:
         plain = plain or background is not None
         self._inset = None if plain else SkeletonInset(*body_bones(performer))
         self.highlights = not plain
+        self.focus = 0
         self.camera = front_camera()
         self._close_up: Camera | None = None
         self._rest = self.stage.boxes
@@ -120,6 +122,11 @@ class Scene:
         homes = np.array([character.pool[:2] - character.spot for character in self._characters])
         self._marks = homes[:, None] + ways
         self._boxes, self.camera = boxes, camera
+
+    def view_from_front(self) -> None:
+        """Look from the front again, with every character in view."""
+        self.camera = front_camera()
+        self.frame_all()
 
     def _framed(self, boxes: NDArray[np.float64]) -> Camera:
         """The camera, moved so that boxes (A, 2, 3) [m] fill the picture."""
@@ -161,18 +168,23 @@ class Scene:
             lit = own if self.highlights else []
             character.highlight([each.points for each in lit], _colours(len(lit)))
         if self._inset is not None and pose is not None:
-            colours = _joint_colours(len(pose.seen), highlights[0])
+            colours = _joint_colours(len(pose.seen), highlights[self.focus])
             self._inset.update(
                 pose.seen,
                 colours=colours,
                 dimmed=pose.filled,
-                view_rotation=_side_of(self._puppets[0]),
+                view_rotation=_side_of(self._puppets[self.focus]),
             )
         self.stage.brightness = 1.0 - self.blackout.level
         for character, spot in zip(self._characters, self._glide.places, strict=True):
             character.spot = spot
         inset = self._inset if pose is not None else None
         self.stage.draw(self._gliding_camera(), inset, self._stage_set())
+
+    @property
+    def inset_side(self) -> float:
+        """The side [px] of the square in the upper left that the inset takes; 0 without one."""
+        return 0.0 if self._inset is None else inset_side(self.stage.size)
 
     def picture(self) -> NDArray[np.uint8]:
         """Return the newest picture (H, W, 4): sRGB with straight alpha, top row first."""

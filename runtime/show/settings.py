@@ -75,8 +75,10 @@ class MatchSettings:
         in_place: characters stay where they are instead of travelling as their performers do.
         rehearse: look through a recording for the pose to start from; False matches a recording as
             it matches a live performer.
-        patience: [s] that a match must be shown before it performs by itself; 0 at once, infinite
-            only when it is accepted. None: at once for a recording, after 1 s for a live performer.
+        patience: [s] that a performer must keep still, with the same match shown, before it
+            performs by itself; 0 at once, infinite only when it is accepted. None: at once for a
+            recording, and until it is accepted where a recording is matched again; after 3 s for a
+            live performer, after 1 s and without keeping still where there is no window.
 
     Raises:
         InputError: a value is out of range; the message names the setting.

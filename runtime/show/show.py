@@ -56,6 +56,7 @@ class Show:
         make_scene: makes the scene, with the arguments of `Scene`.
         make_driver: makes the driver of each puppet; if None, the settings name it.
         clock: host monotonic time [s].
+        tell: takes one line of what happened, such as a take that began; if None, nobody does.
         warn: takes one line about a fault that does not end the show; if None, the line goes to
             standard error.
 
@@ -84,6 +85,7 @@ class Show:
         make_scene: Callable[..., Scene] = Scene,
         make_driver: DriverFactory | None = None,
         clock: Callable[[], float] = time.perf_counter,
+        tell: Callable[[str], None] | None = None,
         warn: Callable[[str], None] | None = None,
     ) -> None:
         self.settings = settings or ShowSettings()
@@ -102,6 +104,7 @@ class Show:
                     make_scene=make_scene,
                     make_driver=make_driver,
                     clock=clock,
+                    tell=tell or _nobody,
                     warn=warn or messages.warn,
                 )
         except BaseException:
@@ -126,6 +129,7 @@ class Show:
         self._enter_graphics()
         with interrupts_deferred():  # so that all outputs have the same frames
             performed = self._loop.tick()
+        self._opened.tell_sight()
         if self._opened.window_controls is not None:
             self._opened.window_controls.present()
             self._opened.window_controls.serve()
@@ -252,3 +256,7 @@ class Show:
                 "to one thread"
             )
         self._opened.make_current()
+
+
+def _nobody(_: str) -> None:
+    """Take a line, and tell nobody."""

@@ -48,6 +48,12 @@ class MatchHysteresis:
         """The match to show; None before the first."""
         return self._shown
 
+    @property
+    def place(self) -> tuple[int, int]:
+        """The rank of the shown match, 1 for the best, 0 if it is unranked; and how many rank."""
+        position = self._position(self._shown)
+        return (0 if position is None else position + 1), len(self._ranked)
+
     def snapshot(self) -> MatchHysteresisState:
         """Return the memory that the next update depends on."""
         return MatchHysteresisState(self._shown, self._ranked, self._since, self.pinned)

@@ -12,6 +12,8 @@ import string
 
 from runtime.show.settings import LEAST_SIDE, MOST_SIDE, MOST_STIFFNESS, MOST_VOLUME_GAIN
 
+MOST_SECONDS = 3600.0  # of a countdown
+
 
 def size(text: str) -> tuple[int, int]:
     """Width and height of a picture [px], from ``WxH``."""
@@ -37,6 +39,21 @@ def positive(text: str) -> float:
         raise argparse.ArgumentTypeError(f"expected a number above 0, got {text!r}") from None
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"expected a finite number above 0, got {text!r}")
+    return value
+
+
+def seconds_or_never(text: str) -> float:
+    """A number of seconds from 0, or "never" for infinity."""
+    if text == "never":
+        return math.inf
+    try:
+        value = float(text)
+    except ValueError:
+        value = math.nan
+    if not 0.0 <= value <= MOST_SECONDS:
+        raise argparse.ArgumentTypeError(
+            f"expected seconds from 0 to {MOST_SECONDS:.0f}, or never, got {text!r}"
+        )
     return value
 
 

@@ -14,6 +14,7 @@ from runtime.cli.options.arguments import (
     port_number,
     positive,
     remote_address,
+    seconds_or_never,
     share,
     size,
     stiffness,
@@ -106,6 +107,7 @@ def show_settings(options: argparse.Namespace, origin: str) -> ShowSettings:
             flip=options.flip,
             driver=options.drive,
             in_place=options.in_place,
+            patience=options.countdown,
         ),
         characters=tuple(_character(options, number) for number in range(count)),
         conditioning={
@@ -273,6 +275,13 @@ def _add_match(parser: argparse.ArgumentParser) -> None:
         default=1,
         metavar="N",
         help="use the N-th best match (default 1)",
+    )
+    match.add_argument(
+        "--countdown",
+        type=seconds_or_never,
+        metavar="S|never",
+        help="seconds that a performer keeps still before the match shown performs; never waits "
+        "for Enter (default 3; a recording starts at once)",
     )
     match.add_argument(
         "--mapping",

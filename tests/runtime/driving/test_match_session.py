@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from devices.errors import InputError
+from runtime.driving.choices import Choices
 from runtime.driving.mapping import Drive, Mapping
 from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer, Pose
-from runtime.driving.puppet_match import Choices
 from runtime.puppet.puppet import Puppet
 from tests.runtime.stick_figures import (
     ARMS,
@@ -180,9 +180,63 @@ def test_matching_again_looks_at_the_pose_alone(puppet: Puppet) -> None:
     for _ in range(12):
         show.strike(pose(T_POSE))
     assert show.drives == best
-    for _ in range(20):
-        rest = np.abs(show.puppet.deform().vertices - FIGURE.vertices).max()
-    assert rest < 0.02
+    assert show.match_session.matching
+
+
+def test_a_puppet_performs_on_while_another_match_is_looked_for(puppet: Puppet) -> None:
+    show = Rehearsal(puppet, Choices(patience=math.inf))
+    show.strike(pose(T_POSE))
+    show.match_session.accept()
+    bent = pose({**T_POSE, "ElbowLeft": (0.0, 0.0, 1.2)})
+    moved = show.moves(bent)
+    assert moved > 0.1
+    show.match_session.match_again()
+    show.strike(pose(T_POSE))
+    assert show.moves(bent) > 0.5 * moved
+    (highlight, *_) = puppet.highlights
+    assert puppet.proposal is not None
+    assert highlight.joints == show.drives[0].source[1:]
+    show.match_session.keep()
+    assert puppet.proposal is None
+    assert not show.match_session.matching
+    assert show.moves(bent) == pytest.approx(moved, rel=0.05)
+
+
+def test_only_a_pose_that_is_kept_still_accepts_itself(puppet: Puppet) -> None:
+    show = Rehearsal(puppet, Choices(patience=0.75, stray=0.15))
+    for step in range(30):  # an arm that waves on; the match stays the same
+        show.strike(pose({**T_POSE, "ElbowLeft": (0.0, 0.0, 0.6 * (step % 3))}))
+    assert show.match_session.matching
+    left = []
+    while show.match_session.matching:
+        show.strike(pose(T_POSE))
+        left.append(show.match_session.countdown)
+    assert left[0] == pytest.approx(0.75)
+    assert left == [*sorted(left[:-1], reverse=True), None]
+
+
+def test_actions_on_the_matching_are_for_the_puppet_that_is_selected() -> None:
+    puppets = [Puppet(FIGURE), Puppet(FIGURE)]
+    performer = Performer(BODY)
+    session = MatchSession(
+        performer, puppets, lambda: FRONT_VIEW, Choices(patience=math.inf), [None, None]
+    )
+
+    def strike() -> list[tuple[Drive, ...]]:
+        captured = frame(pose(T_POSE), 0.0)
+        performer.follow(captured)
+        session.direct(captured)
+        return [mapping.drives for mapping in session.mappings]
+
+    first, second = strike()
+    session.selected = 1
+    session.next_match()
+    assert strike()[0] == first
+    assert strike()[1] != second
+    session.accept()
+    session.match_again()
+    assert [puppet.proposal is not None for puppet in puppets] == [False, True]
+    assert [match.candidate.rank for match in session.matches] == [1, 2]
 
 
 def test_the_next_match_can_be_asked_for_in_the_midst_of_a_performance(puppet: Puppet) -> None:

@@ -15,12 +15,12 @@ import pytest
 from devices.errors import InputError
 from replay.player import EveryFrame, Player
 from replay.recording import Recording
+from runtime.driving.choices import Choices
 from runtime.driving.driver import DrivenPart, Driver, Highlight, Needs
 from runtime.driving.drivers import DRIVERS, DriverFactory
 from runtime.driving.match_session import MatchSession
 from runtime.driving.pairing import Pairing
 from runtime.driving.performer import Performer, Pose, Rest
-from runtime.driving.puppet_match import Choices
 from runtime.driving.rehearsal import rehearse
 from runtime.driving.targets import HandleGroups, HandleTargets, Placement, Targets
 from runtime.output.files.export import open_export

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from runtime.driving.choices import Choices
 from runtime.driving.mapping import Mapping
 from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer
-from runtime.driving.puppet_match import Choices
 from runtime.driving.rehearsal import POSES, rehearse
 from runtime.puppet.puppet import Puppet
 from tests.runtime.stick_figures import (

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from runtime.driving.choices import Choices
 from runtime.driving.exaggeration import Exaggeration
 from runtime.driving.limb_release import LimbRelease
 from runtime.driving.mapping import Mapping
 from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer, Pose, rest_state
 from runtime.driving.polyline_driver import PolylineDriver
-from runtime.driving.puppet_match import Choices
 from runtime.driving.unfreeze_blend import UnfreezeBlend
 from runtime.puppet.deformable_surface import Elasticity
 from runtime.puppet.puppet import Puppet

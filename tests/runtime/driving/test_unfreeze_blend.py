@@ -10,10 +10,10 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from replay.player import EveryFrame, Player
+from runtime.driving.choices import Choices
 from runtime.driving.mapping import Mapping
 from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer, Pose
-from runtime.driving.puppet_match import Choices
 from runtime.driving.unfreeze_blend import SECONDS, UnfreezeBlend, shortest_turns
 from runtime.output.report.report import Report
 from runtime.puppet.puppet import Puppet

@@ -12,10 +12,10 @@ from replay.player import Player
 from replay.recorded_stream import RecordedStream
 from replay.recording import Recording
 from runtime.conditioning.switches import Conditioning
+from runtime.driving.choices import Choices
 from runtime.driving.mapping import Mapping
 from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer
-from runtime.driving.puppet_match import Choices
 from runtime.output.output import PerformedFrame
 from runtime.output.report.report import Report
 from runtime.puppet.puppet import Puppet

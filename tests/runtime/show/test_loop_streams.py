@@ -7,10 +7,10 @@ import pytest
 
 from replay.player import EveryFrame, Player
 from runtime.conditioning.switches import filled_only, for_live
+from runtime.driving.choices import Choices
 from runtime.driving.mapping import Mapping
 from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer
-from runtime.driving.puppet_match import Choices
 from runtime.output.report.report import Report
 from runtime.puppet.puppet import Puppet
 from runtime.show.act_group import Act

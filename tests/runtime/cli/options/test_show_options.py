@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from pathlib import Path
 
 import pytest
@@ -51,7 +52,7 @@ def test_every_option_arrives() -> None:
         "--size", "64x48", "--plain", "--background", "#010203", "--fps", "30",
         "--source", "arms", "--performers", "1", "--match", "3", "--mapping", "m.json",
         "--drive", "relative", "--chains", "stop", "--flip", "--in-place", "--volume-gain", "2",
-        "--no-outliers", "--mirror",
+        "--countdown", "never", "--no-outliers", "--mirror",
         "--video", "v.mp4", "--frames", "p", "--cache", "c.pc2", "--report", "r.json",
         "--record", "o.mcap", "--export", "e.glb",
         "--virtual-camera", "--ndi", "n", "--spout", "s", "--vmc", "127.0.0.1:1",
@@ -65,7 +66,15 @@ def test_every_option_arrives() -> None:
         plain=True,
         fps=30.0,
         match=MatchSettings(
-            "arms", 1, 3, Path("m.json"), extend=False, flip=True, driver="relative", in_place=True
+            "arms",
+            1,
+            3,
+            Path("m.json"),
+            extend=False,
+            flip=True,
+            driver="relative",
+            in_place=True,
+            patience=math.inf,
         ),
         characters=(CharacterSettings(volume_gain=2.0),),
         conditioning={"outliers": False, "mirror": True},
@@ -107,7 +116,7 @@ def test_no_field_of_the_settings_is_forgotten() -> None:
     """A new setting is either set by an option, and tried above, or is for the library alone."""
     for_the_library = {
         ShowSettings: {"pictures"},
-        MatchSettings: {"rehearse", "patience"},
+        MatchSettings: {"rehearse"},
         FileSettings: {"takes"},
     }
     source = "".join(

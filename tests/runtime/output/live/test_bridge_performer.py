@@ -15,10 +15,10 @@ from devices.builtin.simulator import Simulator
 from devices.skeleton import SkeletonFrame
 from devices.stream import SkeletonStream
 from runtime.conditioning.switches import Conditioning, for_live
+from runtime.driving.choices import Choices
 from runtime.driving.mapping import Mapping
 from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer, Pose
-from runtime.driving.puppet_match import Choices
 from runtime.output.live.bridge_performer import GUESSED, BridgePerformer
 from runtime.output.live.bridge_publisher import BridgePublisher, binding
 from runtime.output.output import Output, PerformedFrame

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from runtime.show.progress import Progress
+from runtime.status.progress import Progress
 
 
 class Terminal(io.StringIO):
@@ -67,7 +67,7 @@ def test_a_stream_that_closes_is_no_error() -> None:
 @pytest.mark.skipif(sys.platform == "win32", reason="needs a POSIX pipe")
 def test_a_reader_that_goes_away_is_no_error() -> None:
     program = """
-from runtime.show.progress import Progress
+from runtime.status.progress import Progress
 import itertools
 clock = itertools.count(0, 100).__next__
 with Progress("replay", 1000, clock=clock) as progress:

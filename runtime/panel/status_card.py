@@ -1,0 +1,82 @@
+"""The card with what the show sees and what to do next, and the notices beside it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from imgui_bundle import ImVec2, ImVec4, imgui
+
+from runtime.panel.gui import GOLD, LACQUER, PAPER
+from runtime.panel.widgets import Colour, card, dot, letters
+from runtime.status.notices import Notice
+from runtime.status.prompts import advice, countdown, headline
+from runtime.status.show_status import ShowStatus
+from runtime.status.stream_watch import Sight
+
+LEAF = (0.44, 0.72, 0.36)
+GREY = (0.55, 0.54, 0.52)
+SIGHTS: dict[Sight, Colour] = {
+    Sight.WAITING: GOLD,
+    Sight.NOT_UNDERSTOOD: LACQUER,
+    Sight.SEEN: LEAF,
+    Sight.LOST: LACQUER,
+    Sight.ENDED: GREY,
+}
+WIDTH = 470.0  # [px] in a picture of the usual height
+HEADLINE = 1.65  # times the height of usual letters
+ADVICE = 1.1
+COUNTDOWN = 9.0
+
+
+def draw_status(status: ShowStatus, left: float, scale: float, margin: float) -> None:
+    """Draw the card at the top, from `left` [px] on, the files that are being recorded in it."""
+    screen = imgui.get_io().display_size
+    width = min(WIDTH * scale, screen.x - left - margin)
+    with card("status", left, margin, width):
+        with letters(HEADLINE):
+            dot(SIGHTS[status.sighting.sight], 8.0 * scale)
+            imgui.text(headline(status))
+        with letters(ADVICE):
+            imgui.push_text_wrap_pos(0.0)
+            imgui.text(advice(status))
+            imgui.pop_text_wrap_pos()
+        for take in status.recording:
+            dot(LACQUER, 6.0 * scale)
+            imgui.text(f"recording {take.path.name}: {clock(take.seconds)}, {take.frames} frames")
+
+
+def draw_countdown(status: ShowStatus, scale: float) -> None:
+    """Draw the seconds until the match performs, large, in the middle of the picture."""
+    left = countdown(status)
+    if left is None or left <= 0.0 or status.sighting.sight is not Sight.SEEN:
+        return
+    screen = imgui.get_io().display_size
+    text = str(math.ceil(left))
+    with letters(COUNTDOWN):
+        size = imgui.calc_text_size(text)
+        fade = 0.35 + 0.65 * (left - math.floor(left))
+        at = ImVec2((screen.x - size.x) / 2.0, 0.16 * screen.y)
+        paint = imgui.get_background_draw_list()
+        shade = imgui.get_color_u32(ImVec4(0.0, 0.0, 0.0, 0.5 * fade))
+        paint.add_text(ImVec2(at.x + 3.0 * scale, at.y + 3.0 * scale), shade, text)
+        paint.add_text(at, imgui.get_color_u32(ImVec4(*PAPER, fade)), text)
+
+
+def draw_notices(notices: Sequence[Notice], above: float, scale: float) -> None:
+    """Draw what happened last, the newest lowest, `above` the lower border of the picture [px]."""
+    if not notices:
+        return
+    screen = imgui.get_io().display_size
+    widest = max(imgui.calc_text_size(notice.text).x for notice in notices)
+    width = min(widest + 56.0 * scale, screen.x - 40.0 * scale)
+    with card("notices", (screen.x - width) / 2.0, -above, width):
+        for notice in notices:
+            dot(LACQUER if notice.fault else GOLD, 4.0 * scale)
+            imgui.text_wrapped(notice.text)
+
+
+def clock(seconds: float) -> str:
+    """Minutes and seconds, as 1:05."""
+    minutes, rest = divmod(max(seconds, 0.0), 60.0)
+    return f"{int(minutes)}:{int(rest):02}"

@@ -1,0 +1,124 @@
+"""The few kinds of widgets that the panel is made of; each does an action of the table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from imgui_bundle import ImVec2, ImVec4, imgui
+
+from runtime.control.actions import ACTIONS, press, set_value
+from runtime.control.keys import KEYS
+from runtime.control.show_controls import ShowControls
+from runtime.panel.gui import GOLD, LACQUER
+
+Colour = tuple[float, float, float]
+
+FIXED = (
+    imgui.WindowFlags_.no_decoration
+    | imgui.WindowFlags_.no_move
+    | imgui.WindowFlags_.no_saved_settings
+    | imgui.WindowFlags_.no_nav
+)
+KEY_OF = {name: key for key, name in KEYS.items()}
+
+
+@contextmanager
+def card(
+    name: str, left: float, top: float, width: float, height: float = 0.0, *, opacity: float = 0.84
+) -> Iterator[None]:
+    """A window without a frame, at a place of the picture [px]; as high as it needs where 0.
+
+    A negative `left` or `top` counts from the other side.
+    """
+    screen = imgui.get_io().display_size
+    pivot = ImVec2(float(left < 0.0), float(top < 0.0))
+    at = ImVec2(screen.x + left if left < 0.0 else left, screen.y + top if top < 0.0 else top)
+    imgui.set_next_window_pos(at, imgui.Cond_.always, pivot)
+    imgui.set_next_window_size(ImVec2(width, height))
+    imgui.set_next_window_bg_alpha(opacity)
+    imgui.begin(name, None, FIXED)
+    try:
+        yield
+    finally:
+        imgui.end()
+
+
+def button(
+    name: str,
+    controls: ShowControls,
+    *,
+    icon: str = "",
+    label: str | None = None,
+    lights: bool = True,
+) -> None:
+    """A button that presses an action; if it `lights`, it is lit while the action is on."""
+    action = ACTIONS[name]
+    lit = lights and action.read is not None and action.read(controls) >= 0.5
+    if lit:
+        imgui.push_style_color(imgui.Col_.button, ImVec4(*LACQUER, 0.9))
+    words = " ".join(part for part in (icon, action.label if label is None else label) if part)
+    if imgui.button(f"{words}##{name}"):
+        press(name, controls)
+    if lit:
+        imgui.pop_style_color()
+    hint(name)
+
+
+def hint(name: str) -> None:
+    """What the widget before does, and its key, while the mouse is over it."""
+    if imgui.is_item_hovered(imgui.HoveredFlags_.delay_short):
+        key = f"  [{KEY_OF[name]}]" if name in KEY_OF else ""
+        imgui.set_tooltip(f"{ACTIONS[name].text}{key}")
+
+
+def fader(name: str, controls: ShowControls) -> None:
+    """A slider that sets an action's value."""
+    action = ACTIONS[name]
+    assert action.read is not None
+    imgui.text(action.label)
+    imgui.set_next_item_width(-1.0)
+    before = action.read(controls)
+    changed, value = imgui.slider_float(f"##{name}", before, 0.0, 1.0, "")
+    if changed and value != before:
+        set_value(name, value, controls)
+    hint(name)
+
+
+def switch(name: str, controls: ShowControls) -> None:
+    """A box that is ticked while the action is on."""
+    action = ACTIONS[name]
+    assert action.read is not None
+    on = action.read(controls) >= 0.5
+    padding = imgui.get_style().frame_padding
+    imgui.push_style_var(imgui.StyleVar_.frame_padding, ImVec2(0.4 * padding.x, 0.4 * padding.y))
+    changed, _ = imgui.checkbox(action.label, on)
+    imgui.pop_style_var()
+    if changed:
+        press(name, controls)
+    hint(name)
+
+
+def dot(colour: Colour, radius: float) -> None:
+    """A coloured dot at the height of a line of text; the next widget stands beside it."""
+    at, line = imgui.get_cursor_screen_pos(), imgui.get_text_line_height()
+    shade = imgui.get_color_u32(ImVec4(*colour, 1.0))
+    middle = ImVec2(at.x + radius, at.y + line / 2.0)
+    imgui.get_window_draw_list().add_circle_filled(middle, radius, shade)
+    imgui.dummy(ImVec2(2.0 * radius, line))
+    imgui.same_line()
+
+
+@contextmanager
+def letters(scale: float) -> Iterator[None]:
+    """Letters so many times as high as usual."""
+    imgui.push_font(None, imgui.get_style().font_size_base * scale)
+    try:
+        yield
+    finally:
+        imgui.pop_font()
+
+
+def heading(text: str) -> None:
+    """A line that names what follows."""
+    imgui.text_colored(ImVec4(*GOLD, 1.0), text)

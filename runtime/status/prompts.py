@@ -1,0 +1,108 @@
+"""What a show says to people: what it sees, and what to do next, in plain words."""
+
+from __future__ import annotations
+
+import math
+
+from runtime.status.show_status import CharacterStatus, ShowStatus
+from runtime.status.stream_watch import Sight, Sighting
+
+
+def headline(status: ShowStatus) -> str:
+    """What is seen of the performer, to be read from two metres away."""
+    if status.playback is not None and status.playback.paused:
+        return "Paused"
+    if status.frozen:
+        return "Frozen"
+    return {
+        Sight.WAITING: "Waiting for a performer",
+        Sight.NOT_UNDERSTOOD: "Something comes, but no performer",
+        Sight.SEEN: "Playing" if status.playback is not None else "Performer in view",
+        Sight.LOST: "Performer lost",
+        Sight.ENDED: "The end",
+    }[status.sighting.sight]
+
+
+def advice(status: ShowStatus) -> str:
+    """What to do next, in one or two sentences."""
+    if status.playback is not None and status.playback.paused:
+        return "Space plays on. Drag the line below to go to another moment."
+    if status.frozen:
+        return "The characters stand still. Press e to let them move again."
+    sighting = status.sighting
+    if sighting.trouble:
+        return sighting.trouble
+    if sighting.sight is Sight.SEEN:
+        return _advice_on_matching(status)
+    return {
+        Sight.WAITING: f"Start the sender, or step in front of the sensor. {_listening(status)}",
+        Sight.NOT_UNDERSTOOD: _not_understood(sighting, status.origin),
+        Sight.LOST: f"Nothing has come for {_duration(sighting.seconds)}: step back into view, or "
+        "look whether the sender still runs.",
+        Sight.ENDED: "The recording is over. Home plays it again.",
+    }[sighting.sight]
+
+
+def news(before: Sight, sighting: Sighting, origin: str) -> str:
+    """One line on what is seen, after something else was seen before."""
+    if sighting.sight is Sight.SEEN:
+        return "the performer is back" if before is Sight.LOST else "the performer is in view"
+    if sighting.sight is Sight.LOST:
+        return "the performer is lost: nothing comes any more; the characters ease to rest"
+    if sighting.sight is Sight.NOT_UNDERSTOOD:
+        return _not_understood(sighting, origin)
+    return f"waiting for a performer at {origin}"
+
+
+def countdown(status: ShowStatus) -> float | None:
+    """[s] until what is shown performs by itself; None where nothing does."""
+    left = [
+        character.countdown
+        for character in status.characters
+        if character.countdown is not None and math.isfinite(character.countdown)
+    ]
+    return min(left, default=None)
+
+
+def _advice_on_matching(status: ShowStatus) -> str:
+    matching = [character for character in status.characters if character.matching]
+    if not matching:
+        return "Perform! Press m to match again, r to record a take, ? for all keys."
+    if all(character.countdown is None for character in matching):
+        return "Step into view with your whole body."
+    live = status.playback is None
+    strike = f"Strike the pose of {matching[0].name}: " if live else f"{matching[0].name}: "
+    return f"{strike}{_candidate(matching[0])} {_accepting(status)}"
+
+
+def _candidate(character: CharacterStatus) -> str:
+    if character.candidate is None:
+        return "it follows limb by limb."
+    if character.candidate.rank == 0:
+        return "it follows the mapping in the file."
+    return f"match {character.candidate.rank} of {character.candidate.count} lights up."
+
+
+def _accepting(status: ShowStatus) -> str:
+    left = countdown(status)
+    if left is None:
+        return "Enter accepts it, the arrows show others."
+    return f"Keep still: it starts in {math.ceil(left)}. Enter starts it, the arrows show others."
+
+
+def _listening(status: ShowStatus) -> str:
+    return f"Listening at {status.origin}." if "://" in status.origin else ""
+
+
+def _not_understood(sighting: Sighting, origin: str) -> str:
+    refused = f", {sighting.refused} of them unreadable" if sighting.refused else ""
+    return (
+        f"{sighting.packets} packets came{refused}, and no skeleton in them. Does the sender send "
+        f"what {origin.partition('://')[0] or 'this device'} expects?"
+    )
+
+
+def _duration(seconds: float) -> str:
+    if seconds < 90.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min"

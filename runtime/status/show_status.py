@@ -1,0 +1,115 @@
+"""The state of a show for people: what is seen, what drives what, what is recorded."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from replay.playback import Playback
+from runtime.driving.choices import Candidate
+from runtime.driving.driver import DrivenPart
+from runtime.show.act_group import Act
+from runtime.show.loop import FrameLoop
+from runtime.show.takes import RunningTake, Takes
+from runtime.status.stream_watch import Sighting, StreamWatch
+
+
+@dataclass(frozen=True, slots=True)
+class CharacterStatus:
+    """What one character does.
+
+    Attributes:
+        name: of the character.
+        parts: what drives what; as it is shown while a match is looked for.
+        performing: whether a performer drives it.
+        matching: whether a match is looked for.
+        candidate: the match that is shown; None where the anatomy chooses.
+        countdown: [s] until what is shown performs by itself; infinite if it waits to be accepted,
+            None while no pose is struck.
+    """
+
+    name: str
+    parts: Sequence[DrivenPart]
+    performing: bool
+    matching: bool
+    candidate: Candidate | None
+    countdown: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class PlaybackStatus:
+    """Where a recording is.
+
+    Attributes:
+        position, duration: [s].
+        paused: whether it stands still.
+    """
+
+    position: float
+    duration: float
+    paused: bool
+
+
+@dataclass(frozen=True, slots=True)
+class ShowStatus:
+    """The state of a show at one moment.
+
+    Attributes:
+        origin: the address or name of the stream.
+        sighting: what is seen of the performer.
+        characters: from left to right.
+        recording: the files that are being recorded.
+        playback: of a recording; None where the performer is live.
+        frozen: whether the characters are frozen.
+        frames: performed so far.
+    """
+
+    origin: str
+    sighting: Sighting
+    characters: Sequence[CharacterStatus]
+    recording: Sequence[RunningTake]
+    playback: PlaybackStatus | None
+    frozen: bool
+    frames: int
+
+    @property
+    def matching(self) -> bool:
+        """Whether a match is looked for, for any character."""
+        return any(character.matching for character in self.characters)
+
+
+def status_of(
+    origin: str,
+    watch: StreamWatch,
+    acts: Sequence[Act],
+    loop: FrameLoop,
+    takes: Takes,
+    playback: Playback | None,
+) -> ShowStatus:
+    """Return the state of a show as it is now, out of its parts."""
+    return ShowStatus(
+        origin=origin,
+        sighting=watch.look(),
+        characters=[status for act in acts for status in _characters(act)],
+        recording=takes.running,
+        playback=None
+        if playback is None
+        else PlaybackStatus(playback.position, playback.duration, playback.paused),
+        frozen=loop.frozen,
+        frames=loop.frames,
+    )
+
+
+def _characters(act: Act) -> list[CharacterStatus]:
+    session = act.match_session
+    return [
+        CharacterStatus(
+            name=puppet.character.name,
+            parts=match.parts,
+            performing=match.rest is not None,
+            matching=match.matching,
+            candidate=match.candidate,
+            countdown=session.countdown if match.matching else None,
+        )
+        for puppet, match in zip(act.puppets, session.matches, strict=True)
+    ]
