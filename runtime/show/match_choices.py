@@ -1,10 +1,12 @@
-"""When a match performs by itself: what is usual for a live performer and for a recording."""
+"""What the settings of matching ask for, or else what is usual: drivers, and when they perform."""
 
 from __future__ import annotations
 
 import math
 
+from devices.errors import InputError
 from runtime.driving.choices import Choices
+from runtime.driving.drivers import DRIVERS, DriverFactory, matched_driver
 from runtime.show.settings import MatchSettings
 
 COUNTDOWN = 3.0  # [s] that a live performer keeps still before a match performs by itself
@@ -31,3 +33,19 @@ def choices_of(match: MatchSettings, *, recorded: bool, attended: bool) -> Choic
         patience = again = COUNTDOWN if attended else STEADY
     stray = STRAY if attended and not recorded else math.inf
     return Choices(match.rank, match.extend, match.flip, patience, again, stray)
+
+
+def driver_of(match: MatchSettings) -> DriverFactory:
+    """Return what makes the driver that the settings name.
+
+    Raises:
+        InputError: no driver has this name.
+    """
+    name = match.driver
+    if name == "auto" and (match.rank > 1 or match.flip or not match.extend):
+        return matched_driver  # who chooses among matches beats the anatomy
+    if name not in DRIVERS:
+        raise InputError(
+            f"MatchSettings.driver: no driver is called {name!r}; there are: {', '.join(DRIVERS)}"
+        )
+    return DRIVERS[name]

@@ -20,7 +20,7 @@ from runtime.control.keys import WindowControls
 from runtime.control.remote import PORT, Remote
 from runtime.control.show_controls import ShowControls
 from runtime.control.window import Window, leave_windows
-from runtime.driving.drivers import DRIVERS, LIMB_BY_LIMB, DriverFactory, matched_driver
+from runtime.driving.drivers import LIMB_BY_LIMB, DriverFactory
 from runtime.driving.mapping import read_mapping
 from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer
@@ -36,12 +36,12 @@ from runtime.render.context import headless_context, make_current, release_headl
 from runtime.show.act_group import Act, ActGroup
 from runtime.show.interrupts import interrupts_deferred
 from runtime.show.loop import FrameLoop
-from runtime.show.match_choices import choices_of
+from runtime.show.match_choices import choices_of, driver_of
 from runtime.show.outputs import check_outputs, open_outputs
 from runtime.show.pacing import TICKS, loses_no_frame
 from runtime.show.provenance import provenance
 from runtime.show.scene import Scene
-from runtime.show.settings import CharacterSettings, MatchSettings, ShowSettings
+from runtime.show.settings import CharacterSettings, ShowSettings
 from runtime.show.takes import Takes, set_aside
 from runtime.status.notices import Notices, SecondPress
 from runtime.status.prompts import news
@@ -100,7 +100,7 @@ class OpenedShow:
         playback = playback_of(stream)
         if isinstance(playback, Player) and settings.match.driver != "relative":
             playback.leave_out_false_start()
-        self._make_driver = make_driver or _driver(settings.match)
+        self._make_driver = make_driver or driver_of(settings.match)
         if self._make_driver in LIMB_BY_LIMB and settings.match.mapping is None:
             characters = [character.limb_by_limb for character in characters]
         self.remote = self._open_remote()
@@ -396,17 +396,6 @@ class OpenedShow:
     def _open_recorder(self, path: Path) -> Recorder:
         source = provenance(self._origin)
         return Recorder(path, self._stream.skeleton, source=source, tell=self._warn)
-
-
-def _driver(match: MatchSettings) -> DriverFactory:
-    name = match.driver
-    if name == "auto" and (match.rank > 1 or match.flip or not match.extend):
-        return matched_driver  # who chooses among matches beats the anatomy
-    if name not in DRIVERS:
-        raise InputError(
-            f"MatchSettings.driver: no driver is called {name!r}; there are: {', '.join(DRIVERS)}"
-        )
-    return DRIVERS[name]
 
 
 def _check(characters: Sequence[Character], settings: ShowSettings) -> None:

@@ -26,6 +26,7 @@ class Desktop:
     def __init__(self, context: moderngl.Context) -> None:
         self.camera: Camera = front_camera()
         self.should_close = False
+        self.full_screen = False
         self.framebuffer = context.simple_framebuffer(SIZE, components=4)
         self.events: list[Event] = []
         self.swaps = 0
@@ -177,7 +178,7 @@ def test_what_is_shown_is_the_newest_picture(show: Seat) -> None:
 
 def test_other_keys_change_nothing(show: Seat) -> None:
     before = show.state()
-    show.press("q", "f5", "tab", "é")
+    show.press("q", "f5", "f12", "é")
     assert show.state() == before
     assert not show.controls.leaving
     assert show.scene.camera == show.framed

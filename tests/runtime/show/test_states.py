@@ -37,6 +37,7 @@ REMEMBERS = {
     "runtime.conditioning.identities.Identities",
     "runtime.conditioning.levelling.Levelling",
     "runtime.conditioning.rejoining.Rejoining",
+    "runtime.conditioning.silence.Silence",
     "runtime.conditioning.stature.Stature",
     "runtime.conditioning.timeline.Timeline",
     "runtime.driving.exaggeration.Exaggeration",
@@ -82,6 +83,7 @@ IN_ANOTHERS_STATE = {
 
 NO_MEMORY = {
     "runtime.show.clock.StageTimer": "measures; no frame depends on it",
+    "runtime.status.stream_watch.StreamWatch": "watches the host's clock, not the stream's frames",
     "solvers.deform.skinning.SkinnedSurface": "scratch arrays, written before they are read",
     "solvers.deform.rotation_priors.RotationPriors": "scratch arrays, written before they are read",
 }
