@@ -41,7 +41,7 @@ from runtime.show.outputs import check_outputs, open_outputs
 from runtime.show.pacing import TICKS, loses_no_frame
 from runtime.show.provenance import provenance
 from runtime.show.scene import Scene
-from runtime.show.settings import CharacterSettings, ShowSettings
+from runtime.show.settings import CharacterSettings, ShowSettings, check_characters
 from runtime.show.takes import Takes, set_aside
 from runtime.status.notices import Notices, SecondPress
 from runtime.status.prompts import news
@@ -96,7 +96,8 @@ class OpenedShow:
         self._tell, self._warn = self.notices.tell, self.notices.warn
         self._source = stream
         self._stream = closing.enter_context(RecordedStream(stream))
-        _check(characters, settings)
+        check_characters(settings, len(characters))
+        check_outputs(settings, [character.name for character in characters])
         playback = playback_of(stream)
         if isinstance(playback, Player) and settings.match.driver != "relative":
             playback.leave_out_false_start()
@@ -396,21 +397,3 @@ class OpenedShow:
     def _open_recorder(self, path: Path) -> Recorder:
         source = provenance(self._origin)
         return Recorder(path, self._stream.skeleton, source=source, tell=self._warn)
-
-
-def _check(characters: Sequence[Character], settings: ShowSettings) -> None:
-    """Refuse settings that do not fit the characters, and files that cannot be written."""
-    count, performers = len(characters), settings.match.performers
-    if count == 0:
-        raise InputError("a show needs at least one character, got none")
-    if performers > count:
-        raise InputError(
-            f"MatchSettings.performers: {performers} performers need as many characters, "
-            f"got {count}"
-        )
-    if len(settings.characters) not in (1, count):
-        raise InputError(
-            f"ShowSettings.characters: expected the settings of all {count} characters or of one "
-            f"for all, got {len(settings.characters)}"
-        )
-    check_outputs(settings, [character.name for character in characters])

@@ -328,3 +328,24 @@ def _check_path(settings: Settings, name: str) -> None:
 def _refusal(settings: Settings, name: str, expected: str) -> InputError:
     value = getattr(settings, name)
     return InputError(f"{type(settings).__name__}.{name}: expected {expected}, got {value!r}")
+
+
+def check_characters(settings: ShowSettings, count: int) -> None:
+    """Refuse settings that do not fit a show of `count` characters.
+
+    Raises:
+        InputError: there is no character, or too few or too many settings of characters.
+    """
+    performers = settings.match.performers
+    if count == 0:
+        raise InputError("a show needs at least one character, got none")
+    if performers > count:
+        raise InputError(
+            f"MatchSettings.performers: {performers} performers need as many characters, "
+            f"got {count}"
+        )
+    if len(settings.characters) not in (1, count):
+        raise InputError(
+            f"ShowSettings.characters: expected the settings of all {count} characters or of one "
+            f"for all, got {len(settings.characters)}"
+        )

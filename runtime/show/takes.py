@@ -144,7 +144,7 @@ class Takes:
         whole, self._whole = self._whole, None
         self._keep()
         if whole is not None:
-            whole.close()
+            self._end(whole)
         for thread in self._ending:
             thread.join()
 
@@ -166,12 +166,15 @@ class Takes:
         self._stream.keep = keep if keeps else None
 
     def _finish(self, recorder: Recorder) -> None:
+        self._end(recorder)
+        if not recorder.fault:
+            self._tell(f"recorded {recorder.frames} frames to {recorder.path}")
+
+    def _end(self, recorder: Recorder) -> None:
         recorder.close()
         lost = f", {recorder.lost} lost" if recorder.lost else ""
         said = f"{counting(recorder.frames, 'frame')}{lost}, {size_of(recorder.path)}"
         self.kept.append(Kept(recorder.path, said, recorder.fault))
-        if not recorder.fault:
-            self._tell(f"recorded {recorder.frames} frames to {recorder.path}")
 
 
 def set_aside(path: Path, tell: Callable[[str], None]) -> None:

@@ -1,0 +1,159 @@
+"""The panel over the picture: it shows the state of a show, and its buttons do the actions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import moderngl
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from replay.player import EveryFrame, Player
+from runtime.control.actions import ACTIONS
+from runtime.control.show_controls import ShowControls
+from runtime.panel.panel import Panel
+from runtime.status.show_status import ShowStatus
+from tests.runtime.staged import StagedShow
+from tests.runtime.stick_figures import make_figure, record, waving
+
+SIZE = (1280, 720)
+LETTER_HEIGHT = 9  # [px] the lowest that can be read
+
+
+class Screen:
+    """A panel over a grey picture, and a mouse."""
+
+    def __init__(self, context: moderngl.Context, show: StagedShow) -> None:
+        self.now = 0.0
+        self.target = context.simple_framebuffer(SIZE, components=4)
+        self.panel = Panel(context, show.controls, show._opened.status, clock=lambda: self.now)
+
+    def draw(self, frames: int = 2) -> NDArray[np.uint8]:
+        """Draw so many pictures a fifth of a second apart; the last, upper row first."""
+        for _ in range(frames):
+            self.now += 0.2
+            self.target.clear(0.5, 0.5, 0.5, 1.0)
+            self.panel.draw(self.target)
+        width, height = self.target.size
+        read = np.frombuffer(self.target.read(components=3, alignment=1), np.uint8)
+        return read.reshape(height, width, 3)[::-1]
+
+    def click(self, x: float, y: float) -> bool:
+        """Click with the left button; whether the panel kept the click for itself."""
+        gui = self.panel.gui
+        gui.cursor(x, y)
+        self.draw(1)
+        kept = gui.button(0, down=True)
+        self.draw(1)
+        gui.button(0, down=False)
+        self.draw(1)
+        return kept
+
+
+@pytest.fixture
+def show(context: moderngl.Context, tmp_path: Path) -> Iterator[StagedShow]:
+    stream = Player(record(waving(60)), EveryFrame())
+    show = StagedShow(context, make_figure(), stream, tmp_path)
+    show.loop.tick()
+    yield show
+    show.close()
+
+
+@pytest.fixture
+def screen(context: moderngl.Context, show: StagedShow) -> Iterator[Screen]:
+    screen = Screen(context, show)
+    yield screen
+    screen.panel.close()
+    screen.target.release()
+
+
+def covered(picture: NDArray[np.uint8]) -> NDArray[np.bool_]:
+    """The pixels that the panel covers or tints."""
+    return np.abs(picture.astype(int) - 128).max(axis=2) > 2
+
+
+def test_the_panel_leaves_the_middle_of_the_stage_free(screen: Screen) -> None:
+    over = covered(screen.draw())
+    assert 0.05 < over.mean() < 0.45
+    assert not over[250:560, 400:1250].any()
+
+
+def test_a_hidden_panel_draws_nothing(screen: Screen, show: StagedShow) -> None:
+    show.controls.view.panel = False
+    screen.now += 60.0  # after all that has just happened
+    show.now += 60.0
+    assert not covered(screen.draw()).any()
+
+
+def test_the_list_of_keys_fits_the_picture(screen: Screen, show: StagedShow) -> None:
+    show.controls.view.help = True
+    over = covered(screen.draw())
+    assert over.mean() > 0.3
+    assert not over[:, :3].any()
+    assert not over[:, -3:].any()
+
+
+def test_buttons_of_the_bar_do_their_actions_and_clicks_beside_it_pass(
+    screen: Screen, show: StagedShow
+) -> None:
+    """A row of clicks along the bar presses each of its buttons that lights up, at least once."""
+    screen.draw()
+    over = covered(screen.draw())
+    bar = int(np.flatnonzero(over[:, 640]).max()) - 24
+    pressed: set[str] = set()
+    lights = ("hold", "freeze", "blackout", "sliders", "help", "panel")
+    for x in range(20, 1262, 14):
+        before = {name: _lit(show.controls, name) for name in lights}
+        assert screen.click(x, bar)
+        pressed |= {name for name in lights if _lit(show.controls, name) != before[name]}
+        show.controls.view.help = show.controls.view.sliders = False
+        show.controls.view.panel = True
+        show.controls.leaving = False
+        show.takes.stop()
+    assert pressed >= {"hold", "freeze", "blackout", "help", "panel"}
+    assert not screen.click(800, 400)
+
+
+def _lit(controls: ShowControls, name: str) -> float:
+    read = ACTIONS[name].read
+    assert read is not None
+    return read(controls)
+
+
+def test_what_is_done_is_said_for_a_while(screen: Screen, show: StagedShow) -> None:
+    show.controls.view.panel = False
+    screen.draw()
+    show.controls.notices.show("the stage is dark now")
+    assert covered(screen.draw()).any()
+    show.now += 60.0
+    screen.now += 60.0
+    assert not covered(screen.draw()).any()
+
+
+def test_letters_grow_with_the_picture(context: moderngl.Context, show: StagedShow) -> None:
+    """What is readable at 720 lines is readable at 2160."""
+    heights = []
+    for lines in (720, 2160):
+        screen = Screen(context, show)
+        screen.target.release()
+        screen.target = context.simple_framebuffer((16 * lines // 9, lines), components=4)
+        rows = covered(screen.draw())[:, lines // 2]
+        heights.append(rows.sum() / lines)
+        screen.panel.close()
+        screen.target.release()
+    assert heights[0] > LETTER_HEIGHT / 720
+    assert heights[1] == pytest.approx(heights[0], rel=0.15)
+
+
+def test_the_state_of_a_show_is_told_whole(show: StagedShow) -> None:
+    status: ShowStatus = show._opened.status()
+    assert status.playback is not None
+    assert status.playback.duration == pytest.approx(show.stream.duration)
+    (character,) = status.characters
+    assert character.name == show.puppet.character.name
+    assert not status.frozen
+    show.takes.start()
+    (take,) = show._opened.status().recording
+    assert take.path.name == "out-1.mcap"
