@@ -124,7 +124,7 @@ def test_the_whole_table_is_at_hand_by_its_names(show: Staged) -> None:
         if action.write is not None:
             show.client.send_message(f"/bunraku/{name}/set", 0.5)
         show.until(lambda: show.remote._waiting == 0 and not show.remote._requests)
-    assert show.controls.takes.recording
+    show.until(lambda: show.controls.takes.recording)
     show.client.send_message("/bunraku/leave", [])  # asks, while something is recorded
     show.client.send_message("/bunraku/leave", 1.0)
     show.until(lambda: show.controls.leaving)
