@@ -144,7 +144,7 @@ def test_the_tables_are_whole() -> None:
     usage = parser().format_help()
     assert commands == re.findall(r"^    (\w+) {2,}", usage, re.MULTILINE)
     texts = {key: ACTIONS[name].text for key, name in KEYS.items()}
-    section = page("README.md").split("## Keys in the window", 1)[1].split("\n## ", 1)[0]
+    section = page("README.md").split("## The window", 1)[1].split("\n## ", 1)[0]
     shown = dict(re.findall(r"^\| `(\S+)` \| (.+) \|$", section, re.MULTILINE))
     assert shown
     assert shown.items() <= texts.items(), "the rest is in docs/remote.md"
