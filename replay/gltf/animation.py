@@ -206,6 +206,6 @@ def _slerp(first: Array, second: Array, share: Array) -> Array:
     wide = np.where(close, 1.0, sine)
     a = np.where(close, 1.0 - share, np.sin((1.0 - share) * angle) / wide)
     b = np.where(close, share, np.sin(share * angle) / wide)
-    turned: Array = np.where(share > 0.0, _unit(a * first + b * second), first)
-    turned = np.where(share >= 1.0, second, turned)
+    between = np.where(share > 0.0, _unit(a * first + b * second), first)
+    turned: Array = np.where(share >= 1.0, second, between)
     return turned
