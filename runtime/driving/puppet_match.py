@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -126,7 +127,9 @@ class PuppetMatch:
         """[s] that the performer must keep still before what is shown performs by itself."""
         first, again = self._choices.patience, self._choices.again
         own = first if self.rest is None or again is None else again
-        return own if isinstance(self._shown, MappedDriver) else min(own, OF_ANATOMY)
+        if isinstance(self._shown, MappedDriver) or math.isinf(own):
+            return own
+        return min(own, OF_ANATOMY)
 
     @property
     def needs_stillness(self) -> bool:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from devices.bodies.plan_by_names import plan_by_names
 from devices.errors import InputError
 from runtime.driving.choices import Choices
+from runtime.driving.drivers import DRIVERS
 from runtime.driving.mapping import Drive, Mapping
 from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer, Pose
@@ -80,6 +83,23 @@ def test_without_patience_the_first_pose_performs_at_once(puppet: Puppet) -> Non
     assert len(drives) >= 4
     assert show.moves(pose(T_POSE)) < 1e-9, "the pose struck is the rest state"
     assert show.moves(pose()) > 0.2
+
+
+def test_with_endless_patience_the_choice_of_the_anatomy_waits_too() -> None:
+    body = Puppet(replace(FIGURE, plan=plan_by_names(FIGURE.skeleton)))
+    performer = Performer(BODY, "whole")
+    auto = DRIVERS["auto"]
+    for patience, waits in ((math.inf, True), (3.0, False)):
+        choices = Choices(patience=patience)
+        session = MatchSession(
+            performer, [body], lambda: FRONT_VIEW, choices, [None], make_driver=auto
+        )
+        for step in range(20):
+            captured = frame(pose(T_POSE), 0.1 * step)
+            performer.follow(captured)
+            session.direct(captured)
+        assert session.matches[0].candidate is None, "no match was searched"
+        assert session.matching is waits
 
 
 def test_with_endless_patience_it_waits_to_be_accepted(puppet: Puppet) -> None:
