@@ -118,7 +118,9 @@ def save_list(part: str, leave_out: str) -> None:
 
 
 def has_list(part: str, leave_out: str) -> bool:
-    """Whether all files are there that this part of the program needs, for the present kernels.
+    """Whether all files are there and whole that this part needs, for the present kernels.
+
+    A power cut leaves files empty or full of zeros; they count as missing, like a damaged list.
 
     Args:
         part: a name.
@@ -126,7 +128,7 @@ def has_list(part: str, leave_out: str) -> bool:
     """
     name = _list_name(part, leave_out)
     for folder in (FOLDER, PACKED):
-        with suppress(OSError):
+        with suppress(OSError, ValueError):  # a damaged list is no text, or holds no names
             listed = (folder / name).read_text(encoding="utf-8").split("\n")
             paths = [_found(each) for each in listed]
             if None not in paths:
@@ -163,7 +165,15 @@ def _list_name(part: str, leave_out: str) -> str:
 
 def _found(name: str) -> Path | None:
     paths = (FOLDER / name, PACKED / name)
-    return next((path for path in paths if path.exists()), None)
+    return next((path for path in paths if path.is_file() and _is_whole(path)), None)
+
+
+def _is_whole(path: Path) -> bool:
+    """Whether a file begins and ends as pickles do."""
+    with path.open("rb") as file:
+        first = file.read(1)
+        file.seek(-len(first), os.SEEK_END)
+        return (first, file.read(1)) == (pickle.PROTO, pickle.STOP)
 
 
 def _touch(path: Path) -> None:

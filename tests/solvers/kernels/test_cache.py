@@ -112,6 +112,23 @@ def test_a_damaged_file_is_replaced(load: Load, tmp_path: Path):
     assert load(SHAPES, INNER, OUTER) == (37.0, 0)
 
 
+@pytest.mark.parametrize("kind", ["*.nbc", "*.list"])
+@pytest.mark.parametrize("left", [b"", bytes(4096), b"\xff" * 100])
+def test_what_a_power_cut_leaves_is_compiled_anew(
+    load: Load, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, kind: str, left: bytes
+):
+    monkeypatch.setattr(cache, "_used", set())
+    load(SHAPES, INNER, OUTER)
+    cache.save_list("part", "")
+    assert cache.has_list("part", "")
+    for path in (tmp_path / "kernels").glob(kind):
+        path.write_bytes(left)
+    assert not cache.has_list("part", "")
+    assert load(SHAPES, INNER, OUTER) == (37.0, 2 if kind == "*.nbc" else 0)
+    cache.save_list("part", "")
+    assert cache.has_list("part", "")
+
+
 def test_a_folder_that_cannot_be_written_is_no_error(load: Load, tmp_path: Path):
     (tmp_path / "kernels").write_text("in the way")
     assert load(SHAPES, INNER, OUTER) == (37.0, 2)
