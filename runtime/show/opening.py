@@ -46,7 +46,7 @@ from runtime.show.takes import Takes, set_aside
 from runtime.status.notices import Notices, SecondPress
 from runtime.status.prompts import news
 from runtime.status.show_status import ShowStatus, status_of
-from runtime.status.stream_watch import StreamWatch
+from runtime.status.stream_watch import Sight, StreamWatch
 
 if TYPE_CHECKING:
     import moderngl
@@ -154,10 +154,11 @@ class OpenedShow:
             part.matched(mapping.score, parts, skeleton)
 
     def tell_sight(self) -> None:
-        """Tell when a live performer comes into view, is lost or comes back."""
+        """Tell when a live performer comes into view, goes or comes back; warn of unusable data."""
         changed = self.watch.changed() if self._recording is None else None
         if changed is not None:
-            self._tell(news(*changed, self._origin))
+            tell = self._warn if changed[1].sight is Sight.NOT_UNDERSTOOD else self._tell
+            tell(news(*changed, self._origin))
 
     @property
     def _origin(self) -> str:

@@ -13,6 +13,7 @@ from devices.stream import SkeletonStream
 from devices.transport.traffic import Traffic
 
 LOST = 1.0  # [s] without a frame until a performer counts as lost
+PATIENCE = 5.0  # [s] with packets and no frame until it is told: a sender may begin with a greeting
 
 
 class Sight(Enum):
@@ -98,9 +99,14 @@ class StreamWatch:
         return Sighting(sight, now - self._since, traffic.packets, traffic.refused, traffic.trouble)
 
     def changed(self) -> tuple[Sight, Sighting] | None:
-        """Return what was seen before and what is seen now, once after each change; else None."""
+        """Return what was seen before and what is seen now, once after each change; else None.
+
+        What is not understood is told only if it has been so for `PATIENCE`.
+        """
         before, sighting = self._told, self.look()
         if sighting.sight is before:
+            return None
+        if sighting.sight is Sight.NOT_UNDERSTOOD and sighting.seconds < PATIENCE:
             return None
         self._told = sighting.sight
         return before, sighting

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from devices.transport.traffic import Traffic
-from runtime.status.stream_watch import LOST, Sight, StreamWatch
+from runtime.status.prompts import news
+from runtime.status.stream_watch import LOST, PATIENCE, Sight, StreamWatch
 
 
 class Source:
@@ -54,6 +55,22 @@ def test_a_change_is_told_once() -> None:
     watched.watch.note()
     before, sighting = watched.watch.changed()
     assert (before, sighting.sight) == (Sight.WAITING, Sight.SEEN)
+    assert watched.watch.changed() is None
+
+
+def test_packets_without_a_frame_are_told_once_and_only_when_they_last() -> None:
+    watched = Watched()
+    watched.source.traffic = Traffic(packets=1, refused=1)
+    assert watched.watch.changed() is None, "a sender may begin with a greeting"
+    watched.now = PATIENCE
+    watched.source.traffic = Traffic(packets=300, refused=7)
+    told = watched.watch.changed()
+    assert told is not None
+    said = news(*told, "vmc://127.0.0.1:39539")
+    assert "300 packets" in said
+    assert "7 of them unreadable" in said
+    assert "vmc" in said
+    watched.now = 10.0 * PATIENCE
     assert watched.watch.changed() is None
 
 
