@@ -191,6 +191,8 @@ class BodyDriver:
             pose_limbs(rig, joints, trunk, given, self._twists, rotations, positions)
         across = rotate(trunk[1], self._left)
         above = self._ratio * self._footing.above
+        if self._long_arms.spread_wings(positions, rotations, given, across, above):
+            pose_limbs(rig, joints, trunk, given, self._twists, rotations, positions)
         if self._long_arms.raise_arms(positions, rotations, given, across, above):
             pose_limbs(rig, joints, trunk, given, self._twists, rotations, positions)
         path = self._path(pose, rest, heading, positions)

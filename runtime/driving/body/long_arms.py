@@ -4,6 +4,9 @@ A bird that let its wings hang as a performer lets the arms hang would stand on 
 and a robot with long arms could not squat. Arms give way to their own side, and forelegs, which
 stand on the floor at rest, to the front. An arm that just reaches the floor while the body stands
 upright points right; only its hand gives way.
+
+Of a wing that is longer than its shoulder is high, the range from hanging to level is first spread
+over the angle that the floor leaves, so that each pose of the performer's arm looks different.
 """
 
 from __future__ import annotations
@@ -16,7 +19,7 @@ from numpy.typing import NDArray
 from devices.bodies.body_plan import Chain
 from runtime.driving.body.body_parts import Arm, Leg
 from runtime.driving.body.rig_builder import LOW
-from solvers.skeleton.quaternions import multiply
+from solvers.skeleton.quaternions import between, multiply
 from solvers.skeleton.tree import Tree
 
 Array = NDArray[np.float64]
@@ -58,6 +61,7 @@ class LongArms:
             float(self._rest[arm.target[0], 1] - self._rest[:, 1].min()) for arm in self._arms
         ]
         self._hands = [self._yielding(number) for number in range(len(self._arms))]
+        self._reaches = [_reach(self._rest, arm) for arm in self._arms]
 
     def _yielding(self, number: int) -> list[int]:
         """The nodes of a hand that gives way, as hanging it just reaches the floor; else none."""
@@ -81,6 +85,39 @@ class LongArms:
         gaps = hand - a - np.clip(along, 0.0, 1.0)[:, None] * (b - a)
         return float(np.percentile(np.linalg.norm(gaps, axis=1), _THICK))
 
+    def spread_wings(
+        self, positions: Array, rotations: Array, given: Array, left: Array, above: float
+    ) -> bool:
+        """Put the rotations that lift all parts of wings into `given` (S, 4).
+
+        What points from level to straight down then points from level to as steeply as the whole
+        wing may without reaching the floor. What points up is let be.
+
+        Args:
+            positions, rotations, given, left, above: as of `raise_arms`.
+
+        Returns:
+            Whether any wing is lifted.
+        """
+        if not self._arms:
+            return False
+        floor, asides = self._floor(positions, above), self._asides(positions, left)
+        lifted = False
+        for number, arm in enumerate(self._arms):
+            reach = self._reaches[number]
+            is_wing = reach + self._radii[number] > (1.0 + _JUST) * self._heights[number]
+            room = float(positions[arm.target[0], 1]) - floor - self._radii[number]
+            if self._stands[number] or not is_wing or room >= reach:
+                continue
+            share = float(np.arcsin(max(room / reach, 0.0))) / (0.5 * np.pi)
+            ends = (*arm.starts[1:], arm.target[-1])
+            for segment, node, end in zip(arm.segments, arm.starts, ends, strict=True):
+                turn = _lifted(positions[end] - positions[node], share, asides[number])
+                if turn is not None:
+                    given[segment] = multiply(turn, rotations[node])
+                    lifted = True
+        return lifted
+
     def raise_arms(
         self, positions: Array, rotations: Array, given: Array, left: Array, above: float
     ) -> bool:
@@ -98,15 +135,10 @@ class LongArms:
         """
         if not self._arms:
             return False
-        soles = positions[self._soles, 1] - self._rest[self._soles, 1]
-        floor = float(soles.min()) + float(self._rest[:, 1].min()) - max(above, 0.0)
-        shoulders = [arm.target[0] for arm in self._arms]
-        middle = positions[shoulders if len(shoulders) > 1 else self._soles].mean(axis=0)
-        forward = np.cross(left, _UP)
+        floor, asides = self._floor(positions, above), self._asides(positions, left)
         raised = False
         for number, arm in enumerate(self._arms):
-            shoulder = positions[arm.target[0]]
-            aside = forward if self._stands[number] else (shoulder - middle) @ left * left
+            aside = asides[number]
             above_floor = floor + self._radii[number]
             hand = self._hands[number]
             nodes = [node for node in self._nodes[number] if node not in hand]
@@ -124,6 +156,51 @@ class LongArms:
             for segment, node in zip(segments, starts, strict=True):
                 given[segment] = multiply(turn, rotations[node])
         return raised
+
+    def _floor(self, positions: Array, above: float) -> float:
+        """The height [m] of the floor below feet that are `above` [m] where they stand."""
+        soles = positions[self._soles, 1] - self._rest[self._soles, 1]
+        return float(soles.min()) + float(self._rest[:, 1].min()) - max(above, 0.0)
+
+    def _asides(self, positions: Array, left: Array) -> list[Array]:
+        """Where each arm lies down if it hangs, (3,): to its own side, a foreleg forward."""
+        shoulders = [arm.target[0] for arm in self._arms]
+        middle = positions[shoulders if len(shoulders) > 1 else self._soles].mean(axis=0)
+        forward = np.cross(left, _UP)
+        return [
+            forward if stands else (positions[shoulder] - middle) @ left * left
+            for stands, shoulder in zip(self._stands, shoulders, strict=True)
+        ]
+
+
+def _reach(rest: Array, arm: Arm) -> float:
+    """The length [m] of an arm that is stretched out."""
+    joints = rest[[*arm.starts, arm.target[-1]]]
+    return float(np.linalg.norm(np.diff(joints, axis=0), axis=1).sum())
+
+
+def _lifted(way: Array, share: float, aside: Array) -> Array | None:
+    """The rotation (4,) of a segment that leaves a share of its angle below level; None above it.
+
+    Args:
+        way: (3,) [m] along the segment.
+        share: from 0 to 1.
+        aside: (3,) where it points if it hangs.
+    """
+    length = float(np.linalg.norm(way))
+    if length < 1e-9 or way[1] >= 0.0:
+        return None
+    own = way / length
+    outward = aside * (1.0, 0.0, 1.0)
+    size = float(np.linalg.norm(outward))
+    level = own * (1.0, 0.0, 1.0)
+    if size > 1e-9:
+        level = level + own[1] ** 2 / size * outward
+    far = float(np.linalg.norm(level))
+    if far < 1e-9:
+        return None
+    angle = share * float(np.arcsin(min(-own[1], 1.0)))
+    return between(own, np.cos(angle) * level / far - np.sin(angle) * _UP)
 
 
 def _lowest(

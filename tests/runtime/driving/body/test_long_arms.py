@@ -127,3 +127,33 @@ def test_an_arm_that_just_reaches_the_floor_points_right_and_its_hand_gives_way(
     positions[3:, 1] -= 0.2  # a squat
     assert arm.raise_arms(positions, rotations, turns, LEFT, 0.0)
     assert turns[:2].any(axis=1).all()
+
+
+@given(st.floats(0.0, 89.0), st.floats(0.01, 1.0))
+def test_a_wing_shows_each_angle_between_hanging_and_level(angle: float, more: float) -> None:
+    tips = []
+    for down in (angle, min(angle + more, 90.0)):
+        positions, rotations = hung(Rotation.from_euler("z", -down, degrees=True))
+        turns = np.zeros((4, 4))
+        if lying().spread_wings(positions, rotations, turns, LEFT, 0.0):
+            np.testing.assert_allclose(turns[0], turns[1], atol=1e-12)
+            way = Rotation.from_quat(turns[0]).apply(NODES[5] - NODES[3])
+        else:
+            way = positions[5] - positions[3]
+        tips.append(positions[3] + way)
+    assert tips[0][1] > tips[1][1], "still lower"
+    assert tips[1][1] > 0.016 - 1e-9, "above the floor"
+
+
+def test_what_points_up_of_a_wing_is_let_be() -> None:
+    positions, rotations = hung(Rotation.from_euler("z", 0.3))
+    turns = np.zeros((4, 4))
+    assert not lying().spread_wings(positions, rotations, turns, LEFT, 0.0)
+    assert not turns.any()
+
+
+def test_an_arm_that_is_no_wing_is_not_spread() -> None:
+    short = Arm((3, 4), (0,), (3,))
+    positions, rotations = hung(Rotation.from_euler("z", -1.0))
+    positions[3:, 1] -= 0.3  # a squat
+    assert not lying(short).spread_wings(positions, rotations, np.zeros((4, 4)), LEFT, 0.0)
