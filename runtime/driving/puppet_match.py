@@ -192,11 +192,19 @@ class PuppetMatch:
         self.rest, self.matching = rest, False
 
     def restate(self, rest: Rest, view: Array) -> None:
-        """Go on from another rest state for the same mapping, with the same turn limits."""
-        gains = self._driver.gains if isinstance(self._driver, MappedDriver) else None
-        self.perform(rest, view)
-        if isinstance(self._driver, MappedDriver) and gains is not None:
-            self._driver.gains = gains
+        """Go on from another rest state for the same mapping, with the same turn limits.
+
+        A match that is proposed meanwhile stays proposed.
+        """
+        driver = self._driver
+        if isinstance(driver, MappedDriver):
+            gains = driver.gains
+            driver.show(driver.mapping, view)
+            driver.prepare(self._clip, rest)
+            driver.gains = gains
+        else:
+            driver.prepare(self._clip, rest)
+        self.rest = rest
 
     def rehearse(self, clip: Sequence[Pose], states: Sequence[Rest], view: Array) -> None:
         """Let the puppet perform from that one of these rest states which is most like it.
