@@ -76,6 +76,9 @@ class Stage:
         for name, value in settings.items():
             ACTIONS[name].write(self.controls, value)
 
+    def __repr__(self) -> str:
+        return "the stage"  # not all that it holds, which hypothesis would print
+
     def state(self) -> tuple:
         return self.loop.snapshot(), self.player.snapshot()
 
