@@ -39,13 +39,14 @@ class PuppetMatchState:
         rest: the performer's rest state.
         hysteresis: of the match shown.
         matching: whether a match is looked for.
-        proposes: whether a driver is proposed in place of the one that moves the puppet.
+        proposal: the state of the driver that is proposed in place of the one that moves the
+            puppet; None where none is.
     """
 
     rest: Rest | None
     hysteresis: MatchHysteresisState
     matching: bool
-    proposes: bool
+    proposal: object | None
 
 
 class PuppetMatch:
@@ -95,14 +96,17 @@ class PuppetMatch:
 
     def snapshot(self) -> PuppetMatchState:
         """Return what is remembered between frames."""
-        proposes = self._proposal is not None
-        return PuppetMatchState(self.rest, self._hysteresis.snapshot(), self.matching, proposes)
+        proposal = None if self._proposal is None else self._proposal.snapshot()
+        return PuppetMatchState(self.rest, self._hysteresis.snapshot(), self.matching, proposal)
 
     def restore(self, state: PuppetMatchState) -> None:
         """Go back to a snapshot; the puppet's own brings the driver back."""
         self.rest, self.matching = state.rest, state.matching
         self._hysteresis.restore(state.hysteresis)
-        self._propose(self._make(self._make_driver) if state.proposes else None)
+        proposal = None if state.proposal is None else self._make(self._make_driver)
+        if proposal is not None:
+            proposal.restore(state.proposal)
+        self._propose(proposal)
 
     @property
     def mapping(self) -> Mapping:
