@@ -39,6 +39,8 @@ class PuppetMatchState:
         rest: the performer's rest state.
         hysteresis: of the match shown.
         matching: whether a match is looked for.
+        matched: whether matches were stepped to in place of the anatomy's choice.
+        drives_matched: whether the driver that moves the puppet came of that.
         proposal: the state of the driver that is proposed in place of the one that moves the
             puppet; None where none is.
     """
@@ -46,6 +48,8 @@ class PuppetMatchState:
     rest: Rest | None
     hysteresis: MatchHysteresisState
     matching: bool
+    matched: bool
+    drives_matched: bool
     proposal: object | None
 
 
@@ -87,8 +91,8 @@ class PuppetMatch:
         self._hierarchy = TargetHierarchy(puppet.bound_skeleton.tree, puppet.bound_skeleton.root)
         self._hierarchy.rank(source, STRAIGHT_ON, limit=1)  # so that no frame waits for a compiler
         self._hysteresis = MatchHysteresis(choices.rank - 1)
-        self._make_driver = make_driver
-        self._anatomy_first = make_driver is best_driver
+        self._make_usual = make_driver
+        self._matched = self._drives_matched = False
         self.matching = True
         self._driver = self._make(make_driver)
         self._proposal: Driver | None = None
@@ -97,12 +101,17 @@ class PuppetMatch:
     def snapshot(self) -> PuppetMatchState:
         """Return what is remembered between frames."""
         proposal = None if self._proposal is None else self._proposal.snapshot()
-        return PuppetMatchState(self.rest, self._hysteresis.snapshot(), self.matching, proposal)
+        shown, matched = self._hysteresis.snapshot(), (self._matched, self._drives_matched)
+        return PuppetMatchState(self.rest, shown, self.matching, *matched, proposal)
 
     def restore(self, state: PuppetMatchState) -> None:
         """Go back to a snapshot; the puppet's own brings the driver back."""
         self.rest, self.matching = state.rest, state.matching
         self._hysteresis.restore(state.hysteresis)
+        if self._drives_matched is not state.drives_matched:
+            self._matched = state.drives_matched
+            self._drive_with(self._make(self._make_driver))
+        self._matched = state.matched
         proposal = None if state.proposal is None else self._make(self._make_driver)
         if proposal is not None:
             proposal.restore(state.proposal)
@@ -131,9 +140,8 @@ class PuppetMatch:
         """[s] that the performer must keep still before what is shown performs by itself."""
         first, again = self._choices.patience, self._choices.again
         own = first if self.rest is None or again is None else again
-        if isinstance(self._shown, MappedDriver) or math.isinf(own):
-            return own
-        return min(own, OF_ANATOMY)
+        short = not isinstance(self._shown, MappedDriver) and math.isfinite(own)
+        return min(own, OF_ANATOMY) if short else own
 
     @property
     def needs_stillness(self) -> bool:
@@ -190,8 +198,7 @@ class PuppetMatch:
             shown.show(shown.mapping, view)
         shown.prepare(self._clip, rest)
         if shown is not self._driver:
-            self._driver = shown
-            self.puppet.drive_with(shown)
+            self._drive_with(shown)
             self._propose(None)
         self.rest, self.matching = rest, False
 
@@ -255,8 +262,7 @@ class PuppetMatch:
         A puppet that performs goes on until what is shown is accepted.
         """
         self._hysteresis.release()
-        if self._anatomy_first:
-            self._make_driver = best_driver
+        self._matched = False
         self._look_again(view)
 
     def step(self, ranks: int, view: Array) -> None:
@@ -265,8 +271,8 @@ class PuppetMatch:
         Where the anatomy had chosen, the first step shows the best match: the user's choice beats
         both. A puppet that performs goes on until what is shown is accepted.
         """
-        if self._anatomy_first and self._make_driver is best_driver and not self.mapping.drives:
-            self._make_driver = matched_driver
+        if self._make_driver is best_driver and not self.mapping.drives:
+            self._matched = True
             self._look_again(view)
             return
         self._hysteresis.cycle(ranks)
@@ -286,10 +292,18 @@ class PuppetMatch:
             shown.show(mapping, view)
         self.matching = True
         if self.rest is None:
-            self._driver = shown
-            self.puppet.drive_with(shown)
+            self._drive_with(shown)
         else:
             self._propose(shown)
+
+    @property
+    def _make_driver(self) -> DriverFactory:
+        return matched_driver if self._matched else self._make_usual
+
+    def _drive_with(self, driver: Driver) -> None:
+        """Let a driver that `_make_driver` made move the puppet."""
+        self._driver, self._drives_matched = driver, self._matched
+        self.puppet.drive_with(driver)
 
     def _propose(self, driver: Driver | None) -> None:
         self._proposal = self.puppet.proposal = driver
@@ -298,13 +312,13 @@ class PuppetMatch:
         """Let another driver move the puppet from the next pose on, from the same rest state.
 
         A driver that takes a mapping gets the same mapping and the same turn limits; where there
-        is no mapping yet, the best match for the rest state.
+        is no mapping yet, the best match for the rest state. What is proposed is dropped.
 
         Raises:
             InputError: the new driver cannot drive this puppet; the old one goes on.
         """
-        self._propose(None)
         before, driver = self._driver, self._make(make_driver)
+        self.keep()
         if isinstance(driver, MappedDriver):
             mapping = self.mapping
             if self.rest is not None and not mapping.drives:
@@ -313,8 +327,8 @@ class PuppetMatch:
         driver.prepare(self._clip, self.rest)
         if isinstance(driver, MappedDriver) and isinstance(before, MappedDriver):
             driver.gains = before.gains
-        self._driver = driver
-        self.puppet.drive_with(driver)
+        self._make_usual, self._matched = make_driver, False
+        self._drive_with(driver)
 
     def _make(self, make_driver: DriverFactory) -> Driver:
         puppet = self.puppet

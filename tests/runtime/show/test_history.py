@@ -14,6 +14,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from devices.bodies.plan_by_names import plan_by_names
 from replay.builtin import builtin_recording
 from replay.formats import read_recording
 from replay.player import EveryFrame, Player, RealTime
@@ -166,6 +167,24 @@ def test_a_show_put_back_performs_the_same_bytes(
         assert stage.play(*then) == once
         assert (stage.highlights(), digest(stage.state())) == ended
         assert digest(state) == kept, "nothing writes into a state"
+
+
+@pytest.mark.parametrize("at", [4, 8, 12])
+def test_a_show_put_back_is_driven_as_it_was_then(at: int) -> None:
+    """By the anatomy, while a match is proposed in its place, and by the match."""
+    figure = make_figure()
+    stage = Stage(waved(), replace(figure, plan=plan_by_names(figure.skeleton)))
+    steps: Script = {6: [("next-match", None)], 10: [("accept", None)], 16: [("match-again", None)]}
+    stage.play(at, steps)
+    state, set_to = stage.state(), stage.set_to()
+    later: Script = {frame - at: done for frame, done in steps.items() if frame >= at}
+    once = stage.play(20, later)
+    ended = stage.highlights(), digest(stage.state())
+    stage.put_back(state, set_to)
+    assert digest(stage.state()) == digest(state)
+    assert stage.play(20, later) == once
+    assert (stage.highlights(), digest(stage.state())) == ended
+    stage.show.close()
 
 
 def test_states_share_no_array_that_the_show_writes_to(stage: Stage) -> None:
