@@ -39,6 +39,7 @@ _SPINE = 4  # bones of the trunk
 _SHORT = 0.04  # of the size: a trunk that is shorter does not bend
 _MERGED = 0.05  # of the size: legs that fork so far below the crotch are told apart by slices
 _ANKLE = 0.05  # of the size: height of an ankle above the sole
+_COLUMN = 0.5  # of its length: a leg that is thicker is a column
 _FEW = 3  # nodes: a trunk of fewer begins at the hips themselves
 
 
@@ -163,11 +164,15 @@ class _BodyNodes:
             foot = np.sign(self._plane.distance(line[-1:])[0])
             # Where two legs were one to the skeleton, it is of no use above the feet.
             merged = line[0, 1] < crotch - _MERGED * self._size
-            ankle = float(line[-1, 1]) + _ANKLE * self._size
+            sole = float(line[-1, 1])
+            ankle = sole + _ANKLE * self._size
             knee = ankle if merged else float(line[line[:, 1] < crotch, 1].max(initial=ankle))
-            thigh = thigh_line(points, self._plane, foot, crotch, knee)
+            thigh, width = thigh_line(points, self._plane, foot, crotch, knee)
             if not len(thigh) or line[0, 1] >= thigh[0, 1]:
                 return lines
+            if width > _COLUMN * (thigh[0, 1] - sole):  # the skeleton ends at a side of the sole
+                found[side], _ = thigh_line(points, self._plane, foot, crotch, sole)
+                continue
             lower = line[:, 1] < thigh[-1, 1]
             beyond = line[int(np.argmax(lower)) :] if lower.any() else line[-1:]
             found[side] = np.vstack([thigh, line[-1:] if merged else beyond])

@@ -54,8 +54,12 @@ def crotch_height(vertices: Array, faces: Indices, plane: MirrorPlane, start: fl
     return float(corners[..., 1][own].min(initial=start)) if own.any() else start
 
 
-def thigh_line(points: Array, plane: MirrorPlane, side: float, crotch: float, knee: float) -> Array:
-    """Return the middle (m, 3) [m] of a leg, from the hip on down; nothing without any surface.
+def thigh_line(
+    points: Array, plane: MirrorPlane, side: float, crotch: float, knee: float
+) -> tuple[Array, float]:
+    """Return the middle (m, 3) [m] of a leg, from the hip on down, and the width [m] of its thigh.
+
+    Without any surface there, the middle has no points.
 
     Args:
         points: (n, 3) [m] of the surface, without arms.
@@ -83,7 +87,7 @@ def thigh_line(points: Array, plane: MirrorPlane, side: float, crotch: float, kn
         middle[1] = level
         middles.append(middle)
     if not middles:
-        return np.empty((0, 3))
+        return np.empty((0, 3)), 0.0
     hip = middles[0].copy()
     hip[1] = crotch + _JOINT * width
-    return np.array([hip, *middles])
+    return np.array([hip, *middles]), width

@@ -26,6 +26,7 @@ Place = Callable[[Array], Array]
 """Takes points (..., 3) [m] from one space to another."""
 
 _SHORT, _FOOT = 0.02, 0.25  # of the leg: a foot without length, and the length it is given
+_LEADS = 0.5  # of its length: a foot that leads less far forward or aside, or back, is a stump
 _STILL = 1e-6  # [m] a foot that is off by less is in its place
 
 
@@ -85,7 +86,7 @@ class Footing:
         self._lock = FootLock(np.array(lengths))
         ours = nodes[self._points[:, 1]] - nodes[self._points[:, 0]]
         front = rotate(about_vertical(bodies.facing), np.array([0.0, 0.0, 1.0]))
-        ours[np.linalg.norm(ours, axis=1) < _SHORT * leg] = _FOOT * leg * front
+        ours[[not _leads(way, front, leg) for way in ours]] = _FOOT * leg * front
         standing = bodies.upright[self._parts[:, 1]] - bodies.upright[self._parts[:, 0]]
         self._ratio = leg / max(their_leg, 1e-9)
         self._depths = np.array(
@@ -235,6 +236,22 @@ class Footing:
         self._lock.restore(state.lock)
         self._soles.restore(state.soles)
         self._stood = state.stood
+
+
+def _leads(way: Array, front: Array, leg: float) -> bool:
+    """Whether the line of a foot says where its toes are.
+
+    That of a stump, such as an elephant's, leads down to some point of its sole.
+
+    Args:
+        way: (3,) [m] from the ankle to the end of the line.
+        front: (3,) unit, where the body looks.
+        leg: [m] length of the leg.
+    """
+    length = float(np.linalg.norm(way))
+    return bool(
+        length > _SHORT * leg and np.hypot(way[0], way[2]) > _LEADS * length and way @ front > 0.0
+    )
 
 
 def _foot_surface(

@@ -61,13 +61,14 @@ def test_legs_end_where_the_mirror_plane_cuts_the_surface_no_more() -> None:
 
 def test_the_middle_of_a_thigh_is_the_middle_of_its_slices() -> None:
     points = surface_points(*on_two_legs())
-    left = thigh_line(points, MIDDLE, 1.0, 0.8, 0.2)
-    right = thigh_line(points, MIDDLE, -1.0, 0.8, 0.2)
+    left, width = thigh_line(points, MIDDLE, 1.0, 0.8, 0.2)
+    right, _ = thigh_line(points, MIDDLE, -1.0, 0.8, 0.2)
+    assert width == pytest.approx(0.2, abs=0.01)
     np.testing.assert_allclose(left[:, 0], 0.1, atol=0.01)
     np.testing.assert_allclose(right, MIDDLE.mirrored(left), atol=0.01)
     assert left[0, 1] == pytest.approx(0.8 + 0.45 * 0.2, abs=0.01)
     assert left[-1, 1] == pytest.approx(0.2)
-    assert not len(thigh_line(points[points[:, 0] > 0.0], MIDDLE, -1.0, 0.8, 0.2))
+    assert not len(thigh_line(points[points[:, 0] > 0.0], MIDDLE, -1.0, 0.8, 0.2)[0])
 
 
 def test_a_hanging_arm_begins_where_it_turns_down() -> None:
@@ -109,6 +110,17 @@ def test_a_body_gets_a_spine_and_two_sides_that_are_mirror_images() -> None:
         assert len(limbs[Side.LEFT].segments) == 3
     knee = rest[plan.legs[Side.LEFT].upper[-1]]
     np.testing.assert_allclose(knee, (0.11, 0.45, 0.03), atol=0.06)
+
+
+def test_legs_like_columns_go_down_through_their_middle(shared: Path) -> None:
+    character = load_character(shared / "mesh" / "elephant.obj").limb_by_limb
+    rest = character.skeleton.rest_positions
+    for leg in character.plan.legs.values():
+        line = rest[list(leg.chain)]
+        np.testing.assert_allclose(
+            line[:, [0, 2]], line[:1, [0, 2]].repeat(len(line), 0), atol=0.03
+        )
+        assert line[-1, 1] < 0.01
 
 
 def test_what_belongs_to_no_part_stays_where_it_hung() -> None:
