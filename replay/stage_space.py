@@ -142,7 +142,7 @@ def _on_stage(
     if rotations is not None:
         known: NDArray[np.bool_] = np.logical_and.reduce(np.isfinite(rotations), axis=2)
         turned = followed_by(rotations, turn, known=known)
-    return moved, turned, _rest(skeleton, scale, moved, notes)
+    return moved, turned, _rest(skeleton, scale, motion.up, moved, notes)
 
 
 def guessed_unit(skeleton: Skeleton, positions: Array, up: Array, notes: list[str]) -> float:
@@ -260,12 +260,19 @@ def _metres(height: float | None, size: float, notes: list[str]) -> float:
     return _USUAL_HEIGHT / height
 
 
-def _rest(skeleton: Skeleton, scale: float, moved: Array, notes: list[str]) -> Array:
-    """The zero pose, levelled on its own; the first whole frame if the zero pose does not stand."""
+def _rest(
+    skeleton: Skeleton, scale: float, known: Array | None, moved: Array, notes: list[str]
+) -> Array:
+    """The zero pose, levelled on its own; the first whole frame if the zero pose does not stand.
+
+    A zero pose that stands along the up axis of its format, where that is `known`, is level.
+    """
     parts = label_joints(skeleton)
     y = np.array([0.0, 1.0, 0.0])
     rest = skeleton.rest_positions * scale
     up = up_axis(skeleton, parts, rest[None], rest)
+    if up is not None and known is not None and rises(skeleton, parts, rest, known):
+        up = known
     if up is not None:
         rest = rest @ up_to_y(up).T
         stands = stands_upright(skeleton, parts, rest[None], y) and legs_hang(

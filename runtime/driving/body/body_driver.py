@@ -96,7 +96,8 @@ class BodyDriver:
             raise InputError(f"{pairing.character.name} has no part that the performer has too")
         self.parts = parts.parts
         self._parts, self._facing = parts, bodies.facing
-        self._upright_at_rest = upright_at_rest(bodies.upright, bodies.facing, parts.trunk)
+        feet = [limb.chain[-1] for limb in bodies.source.legs.values()]
+        self._upright_at_rest = upright_at_rest(bodies.upright, bodies.facing, parts.trunk, feet)
         self._joint_turns = JointTurns(
             bodies.performer, (*parts.hands, parts.skull), heading_at_rest, bodies.facing
         )

@@ -16,29 +16,46 @@ Array = NDArray[np.float64]
 
 _STANDING = np.cos(np.radians(25.0))  # of the trunk of a rest pose that is upright
 _LEANING = np.cos(np.radians(35.0))  # of the trunk of a pose that is measured
+_LEVEL = np.cos(np.radians(50.0))  # of the trunk of an animal that stands
 _UP = np.array([0.0, 1.0, 0.0])
 PELVIS, CHEST, HEAD = 0, 1, 2
 
 
-def upright_at_rest(upright: Array, facing: float, joints: TrunkJoints) -> Array:
+def upright_at_rest(
+    upright: Array, facing: float, joints: TrunkJoints, feet: Sequence[int] = ()
+) -> Array:
     """Return the orientations (3, 4) of pelvis, chest and head as the rest pose has them.
 
-    A part that does not stand upright there is taken to be vertical. Only how far it leans forward
-    is kept: a rest pose in mid-step twists the hips, and standing upright does not.
+    A part that does not stand upright there is taken to be vertical, but for the trunk of an animal
+    that stands. Only how far it leans forward is kept: a rest pose in mid-step twists the hips, and
+    standing upright does not.
 
     Args:
         upright: (J, 3) [m] the performer's rest pose, turned as the character faces.
         facing: [rad] the heading of both.
         joints: what shows the turns of the trunk.
+        feet: (F,) joints at the ends of the legs.
     """
     own = orientations(upright, joints)
+    is_level = _is_level(upright, joints, feet)
     for part in (PELVIS, CHEST):
         own[part] = _nodding(own[part], facing)
-        if rotate(own[part], _UP)[1] < _STANDING:
+        if rotate(own[part], _UP)[1] < _STANDING and not is_level:
             own[part] = about_vertical(facing)
-    if joints.face[2] < 0 and joints.head >= 0 and own[HEAD, 1] < _STANDING:
+    if joints.face[2] < 0 and joints.head >= 0 and own[HEAD, 1] < _STANDING and not is_level:
         own[HEAD] = np.append(_UP, 0.0)
     return own
+
+
+def _is_level(upright: Array, joints: TrunkJoints, feet: Sequence[int]) -> bool:
+    """Whether a body (J, 3) stands on its legs with a level trunk, as animals do."""
+    if not len(feet) or joints.hips[0] < 0 or joints.shoulders[0] < 0:
+        return False
+    hips, shoulders = upright[joints.hips].mean(axis=0), upright[joints.shoulders].mean(axis=0)
+    spine, leg = shoulders - hips, hips - upright[list(feet)].mean(axis=0)
+    return bool(
+        spine[1] < _LEVEL * np.linalg.norm(spine) and leg[1] > _LEANING * np.linalg.norm(leg)
+    )
 
 
 def upright_in_poses(at_rest: Array, joints: TrunkJoints, poses: Sequence[Array]) -> Array:

@@ -254,3 +254,11 @@ def test_rigs_with_animations_are_recordings(
     recording = read_recording(shared / "rig" / name)
     assert (len(recording), len(recording.skeleton.names)) == (frames, joints)
     assert np.isfinite(recording.positions).all()
+
+
+def test_a_bird_that_is_level_at_rest_stays_level(shared: Path) -> None:
+    skeleton = read_recording(shared / "rig/m2m_bird-animations.glb").skeleton
+    hips, head, foot = skeleton.rest_positions[[*map(skeleton.index, ("hips", "head", "Foot_L"))]]
+    spine, leg = head - hips, foot - hips
+    assert spine[2] > 2.0 * abs(spine[1])
+    assert leg[1] < -2.0 * abs(leg[2])

@@ -68,3 +68,18 @@ def test_who_lies_down_is_not_measured() -> None:
     at_rest = upright_at_rest(REST, 0.0, JOINTS)
     lying = Rotation.from_rotvec([1.5, 0.0, 0.0]).apply(REST)
     np.testing.assert_array_equal(upright_in_poses(at_rest, JOINTS, [lying]), at_rest)
+
+
+def test_the_level_trunk_of_an_animal_is_the_zero_of_its_turns() -> None:
+    pose = np.append(REST, [[0.1, 0.0, 0.0], [-0.1, 0.0, 0.0]], axis=0)  # with feet
+    hips = np.array([0.0, 1.0, 0.0])
+    pose[2:7] = hips + Rotation.from_rotvec([1.5, 0.0, 0.0]).apply(REST[2:] - hips)
+    at_rest = upright_at_rest(pose, 0.0, JOINTS, (7, 8))
+    assert tilts(trunk_turns(pose, JOINTS, at_rest, UPRIGHT)).max() < 1e-3
+
+
+def test_who_lies_in_the_rest_pose_stands_upright_for_the_zero_of_the_turns() -> None:
+    pose = np.append(REST, [[0.1, 0.0, 0.0], [-0.1, 0.0, 0.0]], axis=0)
+    lying = Rotation.from_rotvec([1.5, 0.0, 0.0]).apply(pose)
+    at_rest = upright_at_rest(lying, 0.0, JOINTS, (7, 8))
+    assert tilts(trunk_turns(pose, JOINTS, at_rest, UPRIGHT)).max() < 1e-3
