@@ -1,5 +1,6 @@
 """Blends characters that were frozen to the pose of their performer, so that they do not jump.
 
+A gap in the frames, as in a recording that leaves out who was not seen, counts as a freeze.
 The blend changes the pose that the puppets follow, after conditioning. Matching, publishing and
 filters see the performer's own pose. Each bone turns the short way in the body's own frame, and so
 does the heading of the whole, so that no limb collapses: halfway between an arm that was up and an
@@ -25,6 +26,8 @@ Array = NDArray[np.float64]
 
 SECONDS = 0.3
 LONGEST_STEP = 0.1  # [s] that a frame counts for at most: a performer lost meanwhile goes on there
+GAP = 0.5  # [s] without a frame that count as a freeze, if they are also
+UNUSUAL = 5.0  # times as long as the step before
 PARALLEL = 1e-9  # sine below which two bones have no axis between them
 FRONT, UP = np.array([0.0, 0.0, 1.0]), np.array([0.0, 1.0, 0.0])
 
@@ -62,6 +65,7 @@ class UnfreezeBlendState:
         at: [s] of the last frame.
         passed: [s] since the characters were let go.
         stood: [s] for which they were frozen in all.
+        step: [s] between the two last frames.
     """
 
     shown: Pose | None
@@ -71,6 +75,7 @@ class UnfreezeBlendState:
     at: float
     passed: float
     stood: float
+    step: float
 
 
 class UnfreezeBlend:
@@ -90,7 +95,7 @@ class UnfreezeBlend:
         self._rests: Sequence[Rest | None] = ()
         self._offset: _Offset | None = None
         self._frozen = False
-        self._at, self._passed, self._stood = -np.inf, 0.0, 0.0
+        self._at, self._passed, self._stood, self._step = -np.inf, 0.0, 0.0, np.inf
 
     def snapshot(self) -> UnfreezeBlendState:
         """Return what is remembered between frames."""
@@ -102,13 +107,14 @@ class UnfreezeBlend:
             self._at,
             self._passed,
             self._stood,
+            self._step,
         )
 
     def restore(self, state: UnfreezeBlendState) -> None:
         """Go back to a snapshot."""
         self._shown, self._rests, self._offset = state.shown, state.rests, state.offset
         self._frozen, self._at = state.frozen, state.at
-        self._passed, self._stood = state.passed, state.stood
+        self._passed, self._stood, self._step = state.passed, state.stood, state.step
 
     def freeze(self, time: float) -> None:
         """Stay frozen at `time` [s]; the puppets follow nothing."""
@@ -130,11 +136,17 @@ class UnfreezeBlend:
         """
         if not _same(rests, self._rests):
             self._rests, self._frozen, self._offset = rests, False, None
+        step = time - self._at
+        if self._shown is not None and step > max(GAP, UNUSUAL * self._step):
+            self._frozen = True
+            self._stood += step - max(self._step, 0.0)
+            step = max(self._step, 0.0)
+        self._step = step
         if self._frozen and self._shown is not None:
             self._offset, self._passed = self._between(pose, self._shown), 0.0
         self._frozen = False
         if self._offset is not None:
-            self._passed += min(max(time - self._at, 0.0), LONGEST_STEP)
+            self._passed += min(max(step, 0.0), LONGEST_STEP)
             pose = self._eased(pose, self._offset)
         self._at, self._shown = time, pose
         return replace(pose, time=pose.time - self._stood) if self._stood > 0.0 else pose

@@ -160,9 +160,29 @@ def test_a_rest_state_that_is_taken_meanwhile_is_there_at_once() -> None:
 def test_who_is_lost_on_the_way_goes_on_from_there() -> None:
     """Also who is lost while held: another performer's frames are the show's time."""
     target = followed(pose(T_POSE))
-    way = let_go(followed(pose(UP)), target, [2.1, 9.0, 9.05, 9.2])
+    way = let_go(followed(pose(UP)), target, [2.1, 9.0, 9.1, 9.25])
     shares = [np.abs(each.seen - target.seen).max() for each in way]
     assert shares[0] > shares[1] > shares[2] > shares[3] == 0.0
+
+
+def test_a_gap_in_the_frames_is_eased_over_like_a_freeze() -> None:
+    held, target = followed(pose(T_POSE)), followed(pose(UP, moved=(0.7, 0.0, 0.3)))
+    blend = UnfreezeBlend(BODY)
+    for step in range(3):
+        blend.follow(held, step / RATE, [None])
+    times = 6.0 + np.arange(STEPS + 10) / RATE
+    seen = [blend.follow(replace(target, time=time), time, [None]) for time in times]
+    steps = [np.linalg.norm(a.hips - b.hips) for a, b in zip([held, *seen], seen, strict=False)]
+    assert max(steps) < 3.0 * np.linalg.norm(target.hips - held.hips) / STEPS
+    np.testing.assert_array_equal(seen[-1].seen, target.seen)
+    assert seen[0].time < 0.2, "what drives by time has not waited"
+
+
+def test_slow_streams_are_shown_as_they_come() -> None:
+    blend = UnfreezeBlend(BODY)
+    for second in range(4):
+        given = followed(pose(UP, moved=(0.2 * second, 0.0, 0.0)))
+        np.testing.assert_array_equal(blend.follow(given, float(second), [None]).seen, given.seen)
 
 
 def test_the_time_of_what_is_held_stands_still() -> None:
