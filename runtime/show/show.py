@@ -25,7 +25,7 @@ from runtime.puppet.puppet import Motion
 from runtime.show import messages
 from runtime.show.collector_pauses import collector_paused, objects_frozen
 from runtime.show.interrupts import interrupts_deferred
-from runtime.show.opening import OpenedShow
+from runtime.show.opening.opened_show import OpenedShow
 from runtime.show.pacing import Pace, SpareTime, pace_of
 from runtime.show.scene import Scene
 from runtime.show.settings import ShowSettings
@@ -209,7 +209,7 @@ class Show:
     @property
     def kept(self) -> list[Kept]:
         """What lies where the show wrote files, and with what fault; once it is closed."""
-        return self._opened.kept
+        return self._opened.written.kept
 
     @property
     def playback(self) -> Playback | None:
@@ -255,7 +255,7 @@ class Show:
                 "Expected the thread that made the show, got another: a show that draws belongs "
                 "to one thread"
             )
-        self._opened.make_current()
+        self._opened.display.make_current()
 
 
 def _nobody(_: str) -> None:
