@@ -19,7 +19,7 @@ from runtime.driving.body.joint_turns import JointTurns
 from runtime.driving.body.long_arms import LongArms
 from runtime.driving.body.many_legs import ManyLegs
 from runtime.driving.body.path import Path
-from runtime.driving.body.rearing import Rearing
+from runtime.driving.body.rearing import Rearing, pitched
 from runtime.driving.body.serpent import Serpent, is_serpent
 from runtime.driving.body.upright import upright_at_rest, upright_in_poses
 from runtime.driving.driver import Highlight, Needs
@@ -37,6 +37,7 @@ from solvers.skeleton.quaternions import between, multiply, rotate
 Array = NDArray[np.float64]
 
 _LEVEL = 0.3  # least level share of the axis through both hips, of a body that stands
+_FORELEGS_LIFT = np.array([1.0, 1.0, 0.0])  # pelvis and chest; the head looks where it looked
 _MEASURED = 64  # poses of a clip in which the upright body is measured
 
 
@@ -190,8 +191,12 @@ class BodyDriver:
         if self._many_legs is not None:
             self._many_legs.step(joints, positions, rotations, given)
             pose_limbs(rig, joints, trunk, given, self._twists, rotations, positions)
-        across = rotate(trunk[1], self._left)
         above = self._ratio * self._footing.above
+        rise = self._long_arms.rise(positions, above)
+        if rise != 0.0:
+            trunk = pitched(trunk, rise * _FORELEGS_LIFT, left)
+            pose_limbs(rig, joints, trunk, given, self._twists, rotations, positions)
+        across = rotate(trunk[1], self._left)
         if self._long_arms.spread_wings(positions, rotations, given, across, above):
             pose_limbs(rig, joints, trunk, given, self._twists, rotations, positions)
         if self._long_arms.raise_arms(positions, rotations, given, across, above):

@@ -28,6 +28,8 @@ _ASIDE = 0.3  # of an arm's length: an arm this far below the floor is laid out 
 _JUST = 0.25  # of the shoulder's height: what hangs farther below the floor is a wing
 _WITH_HAND = 3  # segments
 _UP = np.array([0.0, 1.0, 0.0])
+_HANGS = (0.6, 0.9)  # of its length below the shoulder: where a foreleg is lifted, and stands
+_TILT = tuple(np.radians((-10.0, 35.0)))  # of a trunk, down and up, to stand on its forelegs
 _THICK = 90.0  # percentile of the distances from the surface of a hand to its bones
 
 
@@ -50,7 +52,7 @@ class LongArms:
         arms: Sequence[Arm],
         legs: Sequence[Leg],
     ) -> None:
-        self._rest = tree.positions
+        self._rest, self._root = tree.positions, tree.root
         self._soles = np.array([leg.target[2:] for leg in legs], dtype=np.int64).ravel()
         self._arms = list(arms) if legs else []
         self._nodes = [list(tree.subtree(arm.target[0])[1:]) for arm in self._arms]
@@ -156,6 +158,31 @@ class LongArms:
             for segment, node in zip(segments, starts, strict=True):
                 given[segment] = multiply(turn, rotations[node])
         return raised
+
+    def rise(self, positions: Array, above: float) -> float:
+        """Return the angle [rad] by which the trunk rises to stand on straight forelegs.
+
+        It sinks a little to those that hang above the floor. 0 for a body on two legs.
+
+        Args:
+            positions: (K, 3) [m] of the posed nodes.
+            above: [m] how far the feet are above where they stand.
+        """
+        if not self._stands or not all(self._stands):
+            return 0.0
+        floor, most = self._floor(positions, above), -np.inf
+        limbs = zip(self._arms, self._radii, self._nodes, self._reaches, strict=True)
+        for arm, radius, nodes, length in limbs:
+            way = positions[arm.target[0]] - self._rest[self._root]
+            lever = float(np.hypot(way[0], way[2]))
+            low = float(positions[nodes, 1].min()) - radius
+            reach = low - float(positions[arm.target[0], 1])
+            hangs = (-reach / max(length, 1e-9) - _HANGS[0]) / (_HANGS[1] - _HANGS[0])
+            sine = (floor - low) / max(lever, 1e-9)
+            if sine < 0.0:
+                sine *= float(np.clip(hangs, 0.0, 1.0))
+            most = max(most, sine)
+        return float(np.clip(np.arcsin(np.clip(most, -1.0, 1.0)), *_TILT))
 
     def _floor(self, positions: Array, above: float) -> float:
         """The height [m] of the floor below feet that are `above` [m] where they stand."""

@@ -20,8 +20,8 @@ Array = NDArray[np.float64]
 MOST = np.radians(55.0)
 """The angle by which the chest rises when both arms point straight up."""
 
-_RISES = (-0.2, 0.8)  # sine of the lower arm's elevation: from level to fully reared
-_SHARES = (0.5, 1.0, 0.5)  # of pelvis, chest and head
+_RISES = (-0.6, 0.7)  # sine of the lower arm's elevation: from level to fully reared
+_SHARES = np.array([0.5, 1.0, 0.5])  # of pelvis, chest and head
 _LEVEL = 1.0  # of its length along the floor: a trunk that rises by more is upright
 
 
@@ -49,11 +49,7 @@ class Rearing:
         angle = self.angle(joints)
         if angle == 0.0:
             return trunk
-        out = trunk.copy()
-        for part, share in enumerate(_SHARES):
-            half = -0.5 * share * angle
-            out[part] = multiply(np.append(np.sin(half) * left, np.cos(half)), trunk[part])
-        return out
+        return pitched(trunk, angle * _SHARES, left)
 
     def angle(self, joints: Array) -> float:
         """Return the angle [rad] by which the chest rises above its place on four legs."""
@@ -63,6 +59,18 @@ class Rearing:
         share = (min(_elevation(joints[arm]) for arm in self._arms) - low) / (high - low)
         share = float(np.clip(share, 0.0, 1.0))
         return float(MOST) * share * share * (3.0 - 2.0 * share)
+
+
+def pitched(trunk: Array, angles: Array, left: Array) -> Array:
+    """Return the turns (3, 4) of pelvis, chest and head that rise by angles (3,) [rad] in front.
+
+    Args:
+        trunk: (3, 4) world rotations.
+        angles: (3,) [rad].
+        left: (3,) unit, the body's left.
+    """
+    half = -0.5 * angles[:, None]
+    return multiply(np.concatenate([np.sin(half) * left, np.cos(half)], axis=1), trunk)
 
 
 def _is_on_four(plan: BodyPlan, rest: Array) -> bool:

@@ -110,6 +110,39 @@ def test_a_foreleg_that_reaches_below_the_floor_slides_forward() -> None:
     assert way[0] == pytest.approx(0.0, abs=1e-9)
 
 
+def on_four(length: float, angle: float) -> tuple[LongArms, np.ndarray]:
+    """A body with a foreleg 1.2 ahead of its hips, and its nodes with that at an angle [rad].
+
+    The shoulder is 0.8 high, the foreleg stands at rest, and is `length` long where it points.
+    """
+    standing = NODES.copy()
+    standing[3:] = [[0.1, 0.8, 1.2], [0.1, 0.4, 1.2], [0.1, 0.0, 1.2]]
+    owner = np.full(1, 4)
+    body = LongArms(Tree(PARENTS, standing), standing[4:5], owner, [WING], [LEG])
+    posed = standing.copy()
+    way = np.array([0.0, -np.cos(angle), np.sin(angle)])
+    posed[4:] = posed[3] + np.outer([0.5 * length, length], way)
+    return body, posed
+
+
+def test_the_trunk_rises_to_stand_on_straight_forelegs_and_sinks_to_short_ones() -> None:
+    for length in (0.75, 0.8, 1.0):
+        body, posed = on_four(length, 0.0)
+        rise = body.rise(posed, 0.0)
+        assert 0.8 + 1.2 * np.sin(rise) == pytest.approx(length, abs=1e-9)
+    body, posed = on_four(3.0, 0.0)
+    assert body.rise(posed, 0.0) == pytest.approx(np.radians(35.0))
+
+
+def test_forelegs_that_are_lifted_do_not_lower_the_trunk() -> None:
+    body, posed = on_four(0.8, np.radians(70.0))
+    assert body.rise(posed, 0.0) == 0.0
+
+
+def test_the_trunk_of_a_bird_does_not_rise_for_its_wings() -> None:
+    assert lying().rise(hung(Rotation.from_euler("z", -np.pi / 2.0))[0], 0.0) == 0.0
+
+
 def test_an_arm_that_just_reaches_the_floor_points_right_and_its_hand_gives_way() -> None:
     straight = Rotation.from_euler("z", -np.pi / 2.0)
     nodes = np.append(NODES, [[0.0, 0.8, 0.0]], axis=0)
