@@ -5,14 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 _BLENDER_BVH = "open it in Blender (File, Import) and export BVH (File, Export, Motion Capture)"
-_MARKERS = "fit a skeleton to its markers where they were captured (Motive, Vicon) and export BVH"
 _HINTS = {
     ".fbx": ("FBX", _BLENDER_BVH),
     ".dae": ("COLLADA", _BLENDER_BVH),
     ".blend": ("Blender file", "open it in Blender and export BVH (File, Export, Motion Capture)"),
     ".vmd": ("MikuMikuDance motion", "open it in Blender with mmd_tools and export BVH"),
-    ".c3d": ("C3D markers", _MARKERS),
-    ".trc": ("TRC markers", _MARKERS),
     ".asf": ("ASF/AMC", "convert the pair to BVH with amc2bvh, or import it into Blender"),
     ".amc": ("ASF/AMC", "convert the pair to BVH with amc2bvh, or import it into Blender"),
     ".mvnx": ("Xsens MVNX", "export BVH from Xsens MVN (File, Export)"),
@@ -29,7 +26,6 @@ _STARTS = (
     (b"Kaydara FBX Binary", ".fbx"),
     (b"; FBX", ".fbx"),
     (b"Vocaloid Motion Data", ".vmd"),
-    (b"PathFileType", ".trc"),
     (b"# AST/ASF", ".asf"),
     (b":FULLY-SPECIFIED", ".amc"),
     (b"BLENDER", ".blend"),

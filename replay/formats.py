@@ -22,6 +22,8 @@ from replay.kinect.msr import read_msr, recognises_msr
 from replay.kinect.ntu import read_ntu, recognises_ntu
 from replay.kinect.ut import read_ut, recognises_ut
 from replay.leap.reader import read_leap, recognises_leap
+from replay.markers.c3d import read_c3d, recognises_c3d
+from replay.markers.trc import read_trc, recognises_trc
 from replay.mcap.reader import read_mcap, recognises_mcap
 from replay.mediapipe.reader import read_mediapipe, recognises_mediapipe
 from replay.recording import Recording
@@ -113,6 +115,8 @@ def formats() -> tuple[RecordingFormat, ...]:
         RecordingFormat("Kinect v1, UTKinect-Action3D", recognises_ut, _certain(read_ut)),
         RecordingFormat("Kinect v1, MSR Action3D", recognises_msr, _certain(read_msr)),
         RecordingFormat("SMPL motion, AMASS (.npz)", recognises_smpl, read_smpl),
+        RecordingFormat("markers, C3D", recognises_c3d, read_c3d),
+        RecordingFormat("markers, TRC", recognises_trc, read_trc),
         RecordingFormat("BVH", recognises_bvh, read_bvh),
     )
 

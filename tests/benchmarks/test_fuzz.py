@@ -18,6 +18,7 @@ from runtime.benchmarks.fuzzing.watch import Watch
 from tests.replay.kinect import test_readers as kinect
 from tests.replay.kinect.test_tables import POSES
 from tests.replay.kinect.test_tables import azure as azure_json
+from tests.replay.markers.marked_bodies import c3d_bytes, marked, trc_text
 from tests.replay.mediapipe.test_reader import POSE
 from tests.runtime.cli.program import BUNRAKU, ENVIRONMENT
 from tests.thorough import THOROUGH
@@ -27,6 +28,7 @@ INPUTS = 20_000 if THOROUGH else 5_000
 
 def other_recordings(folder: Path) -> Iterator[Path]:
     """Files of the formats that the program reads and does not write."""
+    markers = {name: track[:3] for name, track in marked()[1].items()}
     made: dict[str, str | bytes] = {
         "a_s01_e01_skeleton3D.txt": kinect.msr(),
         "joints_s01_e01.txt": kinect.ut(),
@@ -35,6 +37,9 @@ def other_recordings(folder: Path) -> Iterator[Path]:
         "ntu.skeleton": kinect.ntu(),
         "azure.json": azure_json(POSES),
         "pose.binarypb": POSE,
+        "markers.c3d": c3d_bytes(markers),
+        "integers.c3d": c3d_bytes(markers, scale=0.1, processor=86, analogue=2),
+        "markers.trc": trc_text(markers),
     }
     for name, content in made.items():
         path = folder / name

@@ -18,8 +18,6 @@ from runtime.characters.character_file import read_character
         ("walk", b"Kaydara FBX Binary  \0\x1a\0", "FBX is not read"),
         ("a.fbx", b"; FBX 7.4.0 project file\n", "FBX is not read"),
         ("a.vmd", b"Vocaloid Motion Data 0002\0", "mmd_tools"),
-        ("a.c3d", b"\2\x50\1\2\3", "C3D markers is not read"),
-        ("a.trc", b"PathFileType\t4\t(X/Y/Z)\ta.trc\n", "TRC markers is not read"),
         ("a.amc", b"#!OML:ASF\n:FULLY-SPECIFIED\n", "ASF/AMC is not read"),
         ("a.mvnx", b'<?xml version="1.0"?>\n<mvnx version="4">', "Xsens MVN"),
         ("a.dae", b"<?xml?><COLLADA>", "COLLADA is not read"),
