@@ -1,0 +1,143 @@
+"""The folder of an open session: every edit is on the disk before the next one begins.
+
+What is large never changes: a performance is a file with the name of its content, a recording is
+written once. An edit only replaces the JSON, in one step, so a session that is killed at any moment
+comes back with all edits but perhaps the last.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+from dataclasses import dataclass
+from pathlib import Path
+
+from devices.bounded_json import parse_json
+from devices.errors import InputError
+from devices.skeleton import Skeleton
+from replay.text_file import file_bytes
+from runtime.output.files.whole_file import whole_file, writing
+from runtime.session import codec
+from runtime.session.document import Session
+from runtime.session.performance import Performance
+from runtime.session.performance_file import read_performance, save_performance
+
+DOCUMENT = "session.json"
+PERFORMANCES, RECORDINGS, CHARACTERS = "performances", "recordings", "characters"
+MOST_DOCUMENT = 64 << 20  # bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Opened:
+    """A session as it was read.
+
+    Attributes:
+        session: all that is whole.
+        lost: what is not, a line each.
+    """
+
+    session: Session
+    lost: tuple[str, ...] = ()
+
+
+class SessionFolder:
+    """Reads and writes the files of one session.
+
+    Args:
+        path: the folder; made if it is not there.
+
+    Raises:
+        InputError: it cannot be made.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        with writing(path):
+            for name in (PERFORMANCES, RECORDINGS, CHARACTERS):
+                (path / name).mkdir(parents=True, exist_ok=True)
+        self._performances: dict[str, Performance] = {}
+
+    @property
+    def recordings(self) -> Path:
+        """Where the recordings of takes are."""
+        return self.path / RECORDINGS
+
+    @property
+    def exists(self) -> bool:
+        """Whether a session was written here."""
+        return (self.path / DOCUMENT).is_file()
+
+    def keep(self, performance: Performance, skeleton: Skeleton) -> None:
+        """Write a performance, unless it is there.
+
+        Args:
+            performance: what the character did.
+            skeleton: its nodes at rest, rooted as the performance has them.
+
+        Raises:
+            InputError: the disk fails.
+        """
+        self._performances[performance.key] = performance
+        path = self._file_of(performance.key)
+        if not path.is_file():
+            save_performance(path, performance, skeleton)
+
+    def write(self, session: Session) -> None:
+        """Write the session; its performances have been kept before.
+
+        Raises:
+            InputError: the disk fails; what was written before stays.
+        """
+        text = json.dumps(codec.as_json(session), indent=1, allow_nan=False).encode()
+        with whole_file(self.path / DOCUMENT) as partial, partial.open("wb") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+
+    def read(self) -> Opened:
+        """Read the session that was written last, without the takes that are damaged.
+
+        Raises:
+            InputError: the JSON cannot be read, or is of a newer version.
+        """
+        path = self.path / DOCUMENT
+        try:
+            document = parse_json(file_bytes(path, MOST_DOCUMENT))
+            return self._read(document)
+        except ValueError as error:
+            raise InputError(f"cannot read {path}: it is damaged ({error})") from error
+
+    def remove(self) -> None:
+        """Delete the folder and all that is in it."""
+        shutil.rmtree(self.path, ignore_errors=True)
+
+    def _read(self, document: object) -> Opened:
+        lost: dict[str, str] = {}
+        for name in codec.performances_in(document):
+            try:
+                self._performances[name] = self._whole(name)
+            except InputError as error:
+                lost[name] = str(error)
+        left = codec.without_takes(document, set(lost))
+        session = codec.from_json(left, self._performances.__getitem__)
+        gone = [
+            f"take {take.get('id')} ({take.get('name')}) is lost: {lost[take['performance']]}"
+            for take in codec.takes_in(document)
+            if take.get("performance") in lost
+        ]
+        return Opened(session, tuple(gone))
+
+    def _whole(self, name: str) -> Performance:
+        """The performance of a name, which its content must have.
+
+        Raises:
+            InputError: it is not there, or was damaged.
+        """
+        performance = read_performance(self._file_of(name))
+        if performance.key != name:
+            raise InputError(f"{self._file_of(name)} was changed or damaged")
+        return performance
+
+    def _file_of(self, name: str) -> Path:
+        return self.path / PERFORMANCES / f"{name}.glb"

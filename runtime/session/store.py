@@ -1,0 +1,115 @@
+"""Where a session is kept: one file, and beside it a folder while the session is open."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from devices.errors import InputError
+from devices.skeleton import Skeleton
+from runtime.output.files.whole_file import check_suffix, check_writable
+from runtime.session.archive import SUFFIX, pack, unpack
+from runtime.session.document import Session
+from runtime.session.folder import CHARACTERS, DOCUMENT, PERFORMANCES, RECORDINGS, SessionFolder
+from runtime.session.performance import Performance
+from runtime.session.versions import Versions
+
+UNSAVED = ".unsaved"
+
+
+class SessionStore:
+    """Opens a session, writes each version of it to the disk, and saves it as one file.
+
+    Args:
+        path: of the file, which need not be there; ends in .bunraku.
+
+    Attributes:
+        path: as given.
+        folder: the files of the open session.
+        versions: the session with undo and redo.
+        notes: what was lost or recovered, a line each.
+
+    Raises:
+        InputError: it cannot be read or written, or is of a newer version.
+    """
+
+    def __init__(self, path: Path) -> None:
+        check_suffix(path, (SUFFIX,))
+        check_writable(path)
+        self.path = path
+        beside = path.with_name(path.name + UNSAVED)
+        self.notes: list[str] = []
+        recovered = (beside / DOCUMENT).is_file()
+        self.folder = SessionFolder(beside)
+        session = Session()
+        if recovered:
+            self.notes.append(f"{path} was not closed the last time: all its edits are back")
+        elif path.is_file() and path.stat().st_size > 0:
+            try:
+                self.notes += unpack(path, beside)
+            except InputError:
+                self.folder.remove()
+                raise
+        if self.folder.exists:
+            try:
+                opened = self.folder.read()
+            except InputError as error:
+                if not recovered:
+                    self.folder.remove()
+                raise InputError(f"{path}: {error}") from error
+            session = opened.session
+            self.notes += opened.lost
+        self.versions = Versions(session)
+        self._damaged = len(self.notes) > int(recovered)
+        if self._damaged and path.is_file():
+            kept = path.with_name(f"{path.stem}-damaged{path.suffix}")
+            kept.write_bytes(path.read_bytes())
+            self.notes.append(f"the damaged file is kept as {kept}")
+        self._written: Session | None = session if self.folder.exists else None
+
+    @property
+    def session(self) -> Session:
+        """The version that counts now."""
+        return self.versions.session
+
+    def keep(self, performance: Performance, skeleton: Skeleton) -> None:
+        """Write a performance that the session will mention: see `SessionFolder.keep`."""
+        self.folder.keep(performance, skeleton)
+
+    def write(self) -> None:
+        """Write the version that counts to the disk, if it is not the one written last.
+
+        Raises:
+            InputError: the disk fails; what was written before stays.
+        """
+        if self._written != self.session:
+            self.folder.write(self.session)
+            self._written = self.session
+
+    def save(self) -> None:
+        """Write the whole session as one file.
+
+        Raises:
+            InputError: the disk fails; the older file and the folder stay.
+        """
+        self.write()
+        if self._written is not None:
+            pack(self.folder.path, self._files(), self.path)
+
+    def close(self) -> None:
+        """Save, and delete the folder.
+
+        Raises:
+            InputError: the disk fails; the folder stays and is found when the session is opened.
+        """
+        self.save()
+        self.folder.remove()
+
+    def _files(self) -> list[str]:
+        """The files that the version that counts is made of; the JSON first."""
+        session, folder = self.session, self.folder.path
+        named = [f"{PERFORMANCES}/{take.performance.key}.glb" for take in session.takes]
+        named += [f"{RECORDINGS}/{take.recording}" for take in session.takes if take.recording]
+        characters = sorted(path for path in (folder / CHARACTERS).rglob("*") if path.is_file())
+        named += [path.relative_to(folder).as_posix() for path in characters]
+        there = [name for name in dict.fromkeys(named) if (folder / name).is_file()]
+        return [DOCUMENT, *there]
