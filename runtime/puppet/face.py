@@ -214,6 +214,10 @@ class Face:
         if self._surface is not None and self.weights.any():
             self._surface.add(self.weights, vertices)
 
+    def show(self, weights: Array) -> None:
+        """Show other weights (T,) than the performer's, until the performer's next pose."""
+        self.restore(weights)
+
     def restore(self, weights: Array) -> None:
         """Go back to the weights (T,) of a snapshot."""
         self.weights = weights.copy()

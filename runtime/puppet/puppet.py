@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,6 +41,14 @@ class Motion:
     weights: Array | None = None
 
 
+class Layers(Protocol):
+    """Motion that is put on what a driver says."""
+
+    def over(self, targets: Targets, time: float) -> Targets:
+        """Return the targets with that motion, for a frame at `time` [s]."""
+        ...
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PuppetState:
     """The state of a `Puppet` between two frames.
@@ -49,6 +57,7 @@ class PuppetState:
         surface: of the deformable surface.
         targets: of the last frame.
         stance: of the last frame.
+        layers: put more motion on what the driver says, as a session does; None for none.
         travel: how much of its way it goes.
         driver_kind: the class of the driver; None without one.
         driver: of the driver.
@@ -102,6 +111,7 @@ class Puppet:
         )
         self.driver: Driver | None = None
         self.proposal: Driver | None = None
+        self.layers: Layers | None = None
         self.travel = Travel()
         self.face = Face(character, tell)
         self._targets = skeleton.at_rest
@@ -122,7 +132,8 @@ class Puppet:
         """Take over the targets that the driver has for the performer's pose, and the face."""
         self.face.follow(pose.blends)
         if self.driver is not None:
-            self._targets = self.driver.targets(pose)
+            targets = self.driver.targets(pose)
+            self._targets = targets if self.layers is None else self.layers.over(targets, pose.time)
         self.travel.follow(pose.time)
 
     def deform(self) -> Motion:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from bisect import bisect_left
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -149,18 +150,11 @@ class PerformanceRecorder:
         """[s] from the first frame to the newest."""
         return self._times[-1] - self._times[0] if self._times else 0.0
 
-    def since(self, time: float) -> PerformanceRecorder:
-        """Return a recorder with the frames from `time` [s] on."""
-        first = int(np.searchsorted(self._times, time))
-        return PerformanceRecorder(
-            self.layered,
-            self.named,
-            self._times[first:],
-            self._turns[first:],
-            self._shifts[first:],
-            self._placements[first:],
-            self._faces[first:],
-        )
+    def forget(self, before: float) -> None:
+        """Drop the frames before a time [s]."""
+        first = bisect_left(self._times, before)
+        for frames in (self._times, self._turns, self._shifts, self._placements, self._faces):
+            del frames[:first]
 
     def performance(self) -> Performance | None:
         """Return what was collected, of the nodes that moved or were named; None of no frame."""
@@ -187,7 +181,6 @@ class PerformanceRecorder:
 def _row(placement: Placement) -> Singles:
     """A placement as a row of `Performance.placements`."""
     clearance = np.nan if placement.clearance is None else placement.clearance
-    row = (placement.turn, *placement.travel, placement.lift, clearance)
     row: Singles = np.array(
         [placement.turn, *placement.travel, placement.lift, clearance], dtype=np.float32
     )
@@ -196,7 +189,8 @@ def _row(placement: Placement) -> Singles:
 
 def _between(rows: Singles, first: int, second: int, share: float) -> Array:
     """A share of the way between two rows; what only one of them has is that one's."""
-    start, end = rows[first].astype(np.float64), rows[second].astype(np.float64)
+    start: Array = rows[first].astype(np.float64)
+    end: Array = rows[second].astype(np.float64)
     if share <= 0.0 or first == second:
         return start
     row: Array = (1.0 - share) * start + share * end

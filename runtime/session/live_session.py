@@ -1,0 +1,254 @@
+"""A session in a running show: plays its clips, records takes into it, and undoes edits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from devices.errors import InputError
+from devices.skeleton import Skeleton
+from runtime.puppet.puppet import Puppet
+from runtime.session import edits
+from runtime.session.actor_layers import ActorLayers, Cue
+from runtime.session.document import Session, Take, next_id
+from runtime.session.performance import Performance
+from runtime.session.store import SessionStore
+from runtime.session.transport import Mode, Transport
+
+
+@dataclass(frozen=True, slots=True)
+class StagedActor:
+    """A character of the show that is an actor of the session.
+
+    Attributes:
+        actor: its id in the session.
+        puppet: on the stage.
+        performs: whether a performer moves it now.
+        named: the nodes that its driver names as driven.
+        parts: what drives what, a line each.
+    """
+
+    actor: int
+    puppet: Puppet
+    performs: Callable[[], bool]
+    named: Callable[[], frozenset[int]]
+    parts: Callable[[], Sequence[str]]
+
+
+class LiveSession:
+    """Connects a session with the characters of a show.
+
+    Args:
+        store: where it is kept.
+        staged: the characters, in the order of the session's actors.
+        armed: whether the performer of a puppet is recorded, and moves it.
+        tell: takes one line when something has happened.
+        warn: takes one line on a fault.
+
+    Attributes:
+        store: as given.
+        transport: where the session's time stands.
+    """
+
+    def __init__(
+        self,
+        store: SessionStore,
+        staged: Sequence[StagedActor],
+        armed: Callable[[Puppet], bool],
+        *,
+        tell: Callable[[str], None],
+        warn: Callable[[str], None],
+    ) -> None:
+        self.store = store
+        self.transport = Transport(lambda: self.session.duration)
+        self._staged, self._armed = staged, armed
+        self._tell, self._warn = tell, warn
+        self._time = float("nan")
+        self._start = 0.0
+        self._layers = [self._layered(one) for one in staged]
+        self._recorded: list[ActorLayers] = []
+        self._last: list[int] = []  # the clips of the newest take
+
+    @property
+    def session(self) -> Session:
+        """The version that counts now."""
+        return self.store.session
+
+    # -- Edits -------------------------------------------------------------------------------------
+
+    def edit(self, session: Session, done: str) -> None:
+        """Go on to an edited session by one step, and write it to the disk."""
+        self.store.versions.do(session, done)
+        self._write()
+
+    def drag(self, session: Session, done: str) -> None:
+        """Go on to a session while something is dragged; all of it is one step."""
+        self.store.versions.drag(session, done)
+
+    def drop(self) -> None:
+        """End a drag, and write the session to the disk."""
+        self.store.versions.drop()
+        self._write()
+
+    def undo(self) -> None:
+        """Go back by one step, and say what was undone."""
+        done = self.store.versions.undone
+        self._tell(f"undone: {done}" if self.store.versions.undo() else "nothing to undo")
+        self._write()
+
+    def redo(self) -> None:
+        """Do again what was undone last."""
+        done = self.store.versions.redone
+        self._tell(f"done again: {done}" if self.store.versions.redo() else "nothing to do again")
+        self._write()
+
+    def save(self) -> None:
+        """Write the session as one file."""
+        try:
+            self.store.save()
+        except InputError as error:
+            self._warn(str(error))
+        else:
+            self._tell(f"saved {self.store.path}")
+
+    # -- Takes -------------------------------------------------------------------------------------
+
+    @property
+    def recording(self) -> bool:
+        """Whether a take is recorded."""
+        return self.transport.mode is Mode.RECORDING
+
+    def record(self) -> bool:
+        """Record the armed characters from the session's time on; return whether one can be."""
+        self._recorded = [
+            layers
+            for layers, one in zip(self._layers, self._staged, strict=True)
+            if one.performs() and self._armed(one.puppet)
+        ]
+        if not self._recorded:
+            self._warn("no performer moves a character that is selected: nothing to record yet")
+            return False
+        if self.transport.mode is Mode.PLAYING:
+            self.transport.pause()
+        self._start = self.transport.position
+        for layers in self._recorded:
+            layers.start()
+        self.transport.record()
+        return True
+
+    def stop(self, recording: str = "") -> None:
+        """End the take: it becomes a clip where it was performed, and can be played from there.
+
+        Args:
+            recording: the file of the performers' frames in the session; empty for none.
+        """
+        if not self.recording:
+            return
+        takes = [(layers, layers.stop()) for layers in self._recorded]
+        self._add([(one, made) for one, made in takes if made is not None], self._start, recording)
+        self.transport.rehearse()
+        self.transport.seek(self._start)
+        self.transport.rehearse()
+
+    def recall(self) -> None:
+        """Make a take of what the performers did in the last seconds, with nothing pressed."""
+        takes = [(layers, layers.recall()) for layers in self._layers]
+        made = [(one, each) for one, each in takes if each is not None]
+        if not made:
+            self._tell("nobody has performed yet")
+            return
+        self._add(made, self.transport.position, "")
+        seconds = max(each.duration for _, each in made)
+        self._tell(f"kept the last {seconds:.0f} s as a take")
+
+    def drop_last(self) -> None:
+        """Take the clips of the newest take away, so that it can be performed again."""
+        session = self.session
+        there = {clip.id for clip in session.clips}
+        gone = [number for number in self._last if number in there]
+        if not gone:
+            self._tell("there is no take to do again")
+            return
+        start = min(session.clip(number).start for number in gone)
+        for number in gone:
+            session = edits.without_clip(session, number)
+        self.edit(session, "take away the last take")
+        self.transport.seek(start)
+        self.transport.rehearse()
+
+    def close(self) -> None:
+        """End a take, and save the session.
+
+        Raises:
+            InputError: the disk fails.
+        """
+        self.stop()
+        self.store.close()
+
+    def _add(
+        self, made: Sequence[tuple[ActorLayers, Performance]], start: float, recording: str
+    ) -> None:
+        """Add a take and a clip for each actor, as one step."""
+        session, speed = self.session, 1.0 / self.transport.speed
+        self._last = []
+        name = f"take {next_id(session.takes)}"
+        for layers, performance in made:
+            one = self._staged[self._layers.index(layers)]
+            parts = tuple(one.parts())
+            take = Take(0, name, layers.actor, performance, recording, parts)
+            try:
+                self.store.keep(performance, _skeleton(one.puppet))
+            except InputError as error:
+                self._warn(f"{error}; the take is not kept")
+                continue
+            session = edits.with_take(session, take, start, speed=min(max(speed, 1 / 16), 16.0))
+            self._last.append(session.clips[-1].id)
+        if self._last and session.punch is not None:
+            session = self._punched(session)
+        self.edit(session, f"record {name}")
+
+    def _punched(self, session: Session) -> Session:
+        """The session with its newest clips cut to the range that is to be recorded."""
+        assert session.punch is not None
+        start, end = session.punch
+        for number in list(self._last):
+            clip = session.clip(number)
+            first, last = max(start, clip.start), min(end, clip.end)
+            if last - first < 1e-3:
+                session = edits.without_clip(session, number)
+                self._last.remove(number)
+            else:
+                session = edits.trimmed(session, number, first, last)
+        return session
+
+    # -- Frames ------------------------------------------------------------------------------------
+
+    def _layered(self, one: StagedActor) -> ActorLayers:
+        def cue(time: float) -> Cue:
+            if time != self._time:
+                self._time = time
+                self.transport.advance(time)
+            mode = self.transport.mode
+            live = mode in (Mode.REHEARSING, Mode.RECORDING)
+            return Cue(
+                self.session,
+                self.transport.position,
+                live and one.performs() and self._armed(one.puppet),
+                mode is Mode.RECORDING,
+            )
+
+        layers = ActorLayers(one.actor, one.puppet, cue, one.named)
+        one.puppet.layers = layers
+        return layers
+
+    def _write(self) -> None:
+        try:
+            self.store.write()
+        except InputError as error:
+            self._warn(str(error))
+
+
+def _skeleton(puppet: Puppet) -> Skeleton:
+    """The nodes of a puppet at rest, as its takes have them."""
+    tree = puppet.bound_skeleton.tree
+    return Skeleton(puppet.character.skeleton.names, tree.parents, tree.positions)
