@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from devices.skeleton import SkeletonFrame
+from devices.skeleton import Skeleton, SkeletonFrame
 from replay.fill import EASE_SECONDS, KEEP_SECONDS
 
 SILENT = 0.3  # [s] without a frame, longer than a hitch of a sensor or of the network
@@ -59,6 +59,17 @@ class Silence:
             for slot, frame in enumerate(self._newest)
             if frame is not None and SILENT < now - frame.time < AT_REST + SILENT
         }
+
+
+def nobody(skeleton: Skeleton, time: float) -> SkeletonFrame:
+    """Return a frame at `time` [s] of which no joint is seen."""
+    joints = len(skeleton.names)
+    return SkeletonFrame(
+        time=time,
+        positions=np.full((joints, 3), np.nan),
+        rotations=None,
+        confidence=np.zeros(joints),
+    )
 
 
 def _nobody(frame: SkeletonFrame, time: float) -> SkeletonFrame:

@@ -13,6 +13,8 @@ from enum import Enum
 from runtime.conditioning.switches import SWITCHES
 from runtime.control.show_controls import ShowControls
 from runtime.control.sliders import SLIDERS, STEP, Slider
+from runtime.session.live_session import LiveSession
+from runtime.session.session_takes import record_into
 
 
 class Kind(Enum):
@@ -121,7 +123,9 @@ def _is_paused(controls: ShowControls) -> bool:
 def _pause(controls: ShowControls, on: bool) -> None:
     if controls.playback is None:
         return
-    if on:
+    if controls.session is not None and controls.session.recording:
+        _record(controls, False)
+    elif on:
         controls.playback.pause()
     else:
         controls.playback.resume()
@@ -132,11 +136,46 @@ def _home(controls: ShowControls) -> None:
         controls.playback.seek(0.0)
 
 
+def _is_recording(controls: ShowControls) -> bool:
+    if controls.session is not None:
+        return controls.session.recording
+    return controls.takes.recording
+
+
 def _record(controls: ShowControls, on: bool) -> None:
-    if on:
+    if controls.session is not None:
+        record_into(controls.session, controls.takes, on)
+    elif on:
         controls.takes.start()
     else:
         controls.takes.stop()
+
+
+def _with_session(do: Callable[[LiveSession], None]) -> Do:
+    """What a press does to the session that is open; it says so where none is."""
+
+    def press(controls: ShowControls) -> None:
+        if controls.session is None:
+            controls.notices.show("no session is open: start with `bunraku session FILE`")
+        else:
+            do(controls.session)
+
+    return press
+
+
+def _rehearse(session: LiveSession) -> None:
+    session.transport.rehearse()
+
+
+def _retake(controls: ShowControls) -> None:
+    if controls.session is not None and not controls.session.recording:
+        controls.session.drop_last()
+        record_into(controls.session, controls.takes, True)
+
+
+def _loop(controls: ShowControls, on: bool) -> None:
+    if controls.playback is not None:
+        controls.playback.loop = on
 
 
 def _freeze(controls: ShowControls, on: bool) -> None:
@@ -250,8 +289,36 @@ ACTIONS: Mapping[str, Action] = {
     "record": _switch(
         "Record",
         "begin or end a take: the performer goes to a new file",
-        lambda controls: controls.takes.recording,
+        _is_recording,
         _record,
+    ),
+    "rehearse": Action(
+        "Rehearse",
+        "stop: the performer moves the characters again (a session)",
+        press=_with_session(_rehearse),
+    ),
+    "retake": Action(
+        "Retake", "take the newest take away and record it again (a session)", press=_retake
+    ),
+    "recall": Action(
+        "Keep last",
+        "make a take of the last 30 seconds (a session)",
+        press=_with_session(lambda session: session.recall()),
+    ),
+    "undo": Action(
+        "Undo", "undo the last edit (a session)", press=_with_session(lambda s: s.undo())
+    ),
+    "redo": Action(
+        "Redo", "do again what was undone (a session)", press=_with_session(lambda s: s.redo())
+    ),
+    "save": Action(
+        "Save", "write the session to its file", press=_with_session(lambda s: s.save())
+    ),
+    "loop": _switch(
+        "Loop",
+        "play again from the front at the end, or not",
+        lambda controls: controls.playback is not None and controls.playback.loop,
+        _loop,
     ),
     "freeze": _switch(
         "Freeze",

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from replay.playback import Playback
 from runtime.conditioning.switches import Conditioning
 from runtime.puppet.puppet import Puppet
+from runtime.session.live_session import LiveSession
 from runtime.show.act_group import ActGroup
 from runtime.show.loop import FrameLoop
 from runtime.show.scene import Scene
@@ -44,6 +45,7 @@ class ShowControls:
         takes: the recorder of takes.
         notices: what happened last.
         playback: the playback of a recording; None where the stream is live.
+        session: the session that is open; None for none.
         scene: the picture; None where no picture is drawn.
         view: what the window shows besides the picture.
         leaving: whether the show is to end.
@@ -58,6 +60,7 @@ class ShowControls:
     notices: Notices
     leave_asked: SecondPress
     playback: Playback | None = None
+    session: LiveSession | None = None
     scene: Scene | None = None
     view: View = field(default_factory=View)
     leaving: bool = False

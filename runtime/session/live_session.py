@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from devices.errors import InputError
 from devices.skeleton import Skeleton
@@ -73,6 +74,11 @@ class LiveSession:
     def session(self) -> Session:
         """The version that counts now."""
         return self.store.session
+
+    @property
+    def recordings(self) -> Path:
+        """The folder for recordings of the performers' frames."""
+        return self.store.folder.recordings
 
     # -- Edits -------------------------------------------------------------------------------------
 
@@ -147,8 +153,7 @@ class LiveSession:
         takes = [(layers, layers.stop()) for layers in self._recorded]
         self._add([(one, made) for one, made in takes if made is not None], self._start, recording)
         self.transport.rehearse()
-        self.transport.seek(self._start)
-        self.transport.rehearse()
+        self.transport.go_to(self._start)
 
     def recall(self) -> None:
         """Make a take of what the performers did in the last seconds, with nothing pressed."""
@@ -173,8 +178,8 @@ class LiveSession:
         for number in gone:
             session = edits.without_clip(session, number)
         self.edit(session, "take away the last take")
-        self.transport.seek(start)
         self.transport.rehearse()
+        self.transport.go_to(start)
 
     def close(self) -> None:
         """End a take, and save the session.

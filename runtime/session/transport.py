@@ -77,16 +77,24 @@ class Transport:
         return self.mode in (Mode.PLAYING, Mode.RECORDING)
 
     def seek(self, seconds: float) -> None:
-        """Go to a moment [s]; before 0 to 0. It is shown, unless the session plays or records.
+        """Go to a moment [s]; before 0 to 0. It is shown, unless the session plays.
+
+        While it records, nothing happens.
 
         Raises:
             ValueError: `seconds` is not a number.
         """
         if math.isnan(seconds):
             raise ValueError("Expected `seconds` to be a number, got nan")
-        self._position = max(seconds, 0.0)
+        if self.mode is Mode.RECORDING:
+            return
+        self.go_to(seconds)
         if self.mode is Mode.REHEARSING:
             self.mode = Mode.PAUSED
+
+    def go_to(self, seconds: float) -> None:
+        """Go to a moment [s], whatever the time does; before 0 to 0."""
+        self._position = max(seconds, 0.0)
 
     def pause(self) -> None:
         """Stand still at the moment that is shown."""

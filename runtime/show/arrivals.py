@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
 from devices.skeleton import SkeletonFrame
 from devices.stream import SkeletonStream
 from runtime.conditioning.reception import Reception, ReceptionState
-from runtime.conditioning.silence import Silence, SilenceState
+from runtime.conditioning.silence import Silence, SilenceState, nobody
 from runtime.conditioning.switches import Conditioning, filled_only
 from runtime.show.performer_slots import PerformerSlots, PerformerSlotsState
 
@@ -78,11 +79,13 @@ class Arrivals:
         self._silence.restore(state.silence)
         self.count = state.count
 
-    def poll(self, silence: float = 0.0) -> Arrived:
+    def poll(self, silence: float = 0.0, *, goes_on_at: float = math.nan) -> Arrived:
         """Return what came since the last call.
 
         Args:
             silence: [s] since the newest frame came; 0 where frames may pause, as in a recording.
+            goes_on_at: [s] the host's time, if the show goes on where no frame comes: the first
+                slot then gets one of nobody. NaN if it waits.
         """
         came = self._stream.poll()
         frames = self._reception.receive(came)
@@ -98,4 +101,7 @@ class Arrivals:
         unseen = self._silence.unseen(of_slots, now)
         if newest is None and unseen:
             newest = next(iter(unseen.values()))
+        if newest is None and not math.isnan(goes_on_at):
+            newest = nobody(self._stream.skeleton, goes_on_at if math.isnan(now) else now)
+            unseen = {0: newest}
         return Arrived(newest, {**of_slots, **unseen}, len(came), dropped)

@@ -70,6 +70,7 @@ class FrameLoop:
     Attributes:
         frozen: whether the characters are frozen. Frames are still received, recorded and
             published. Afterwards the characters blend to the pose of their performer.
+        goes_on: whether the show goes on where no performer sends, as while a session plays.
         frames: frames performed so far.
         seconds: performer's time from the first of them to the last [s].
         latency: [s] from the newest frame's arrival until it was handed on to be shown; NaN if its
@@ -91,6 +92,7 @@ class FrameLoop:
         clock: Callable[[], float] = time.perf_counter,
     ) -> None:
         self.frozen = False
+        self.goes_on: Callable[[], bool] = lambda: False
         self.frames = 0
         self.seconds = 0.0
         self.latency = math.nan
@@ -125,7 +127,9 @@ class FrameLoop:
         self._timer.reset()
         with self._timer.stage("frame"):
             with self._timer.stage("poll"):
-                arrived = self._arrivals.poll(0.0 if self._watch is None else self._watch.silence)
+                silence = 0.0 if self._watch is None else self._watch.silence
+                now = self._clock() if self.goes_on() else math.nan
+                arrived = self._arrivals.poll(silence, goes_on_at=now)
                 self._report.dropped += arrived.dropped
                 if self._watch is not None and arrived.came:
                     self._watch.note()
