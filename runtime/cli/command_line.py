@@ -16,6 +16,9 @@ COMMANDS = (
     "demo",
     "replay",
     "live",
+    "session",
+    "edit",
+    "render",
     "record",
     "bridge",
     "devices",
@@ -26,6 +29,9 @@ COMMANDS = (
     "bench",
 )
 """The commands, in the order of `--help`; each is the module of its name in this package."""
+
+IN_SESSIONS = ("session", "edit", "render")
+"""The commands whose modules are in `runtime.cli.sessions`."""
 
 BAD_INPUT = 2
 
@@ -73,7 +79,8 @@ def parser() -> argparse.ArgumentParser:
     top.add_argument("--version", action=_ShowVersion, nargs=0, help="print the version and exit")
     subparsers = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     for name in COMMANDS:
-        command = cast(Command, import_module(f"runtime.cli.{name}"))
+        folder = "runtime.cli.sessions" if name in IN_SESSIONS else "runtime.cli"
+        command = cast(Command, import_module(f"{folder}.{name}"))
         own = subparsers.add_parser(name, help=command.HELP, description=command.HELP)
         command.add_arguments(own)
         own.set_defaults(run=command.run)

@@ -1,4 +1,4 @@
-"""`bunraku info`: prints what a recording or a character's file contains."""
+"""`bunraku info`: prints what a recording, a character or a session contains."""
 
 from __future__ import annotations
 
@@ -7,24 +7,30 @@ from pathlib import Path
 
 from runtime.cli.options.input_options import add_input_options, stated
 
-HELP = "show what a recording or a character contains"
+HELP = "show what a recording, a character or a session contains"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments and options."""
     parser.add_argument(
-        "file", metavar="FILE", help="a recording, a mesh, a rig, or the name of a built-in one"
+        "file",
+        metavar="FILE",
+        help="a recording, a mesh, a rig, a session, or the name of a built-in character",
     )
     add_input_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Print what is in a recording, a mesh or a rig."""
+    """Print what is in a recording, a mesh, a rig or a session."""
     from replay.formats import recognise
     from replay.info import summary
     from runtime.characters.open_character import is_character
 
-    if is_character(options.file):
+    if options.file.lower().endswith(".bunraku"):
+        from runtime.cli.sessions.contents import contents_of
+
+        lines = contents_of(Path(options.file))
+    elif is_character(options.file):
         lines = _of_character(options.file)
     else:
         path = Path(options.file)

@@ -15,6 +15,7 @@ from runtime.characters.open_character import load_character
 from runtime.cli.options.show_options import show_settings
 from runtime.cli.warm import warm_up
 from runtime.control.keys import key_hint
+from runtime.session.store import SessionStore
 from runtime.show import messages
 from runtime.show.collector_pauses import collector_paused
 from runtime.show.interrupts import Interrupted
@@ -30,6 +31,7 @@ def perform(
     *,
     origin: str,
     read: Sequence[tuple[str, Path]] = (),
+    session: SessionStore | None = None,
 ) -> int:
     """Perform the show that the options ask for; the exit code.
 
@@ -38,6 +40,7 @@ def perform(
         open_source: opens the stream, once all files are known to be possible.
         origin: the address or name of the stream.
         read: files that are read and must not be written, each with the name of its option.
+        session: where takes are kept and played from.
 
     Raises:
         InputError: anything that a user can put right; at the end, also for files that are not
@@ -54,19 +57,19 @@ def perform(
     with source as stream:
         with collector_paused():
             characters = [load_character(name) for name in options.character]
-        if not settings.is_noticed and not _ends(stream):
+        if session is None and not settings.is_noticed and not _ends(stream):
             messages.warn(
                 "this show has no window, file or sender, and runs until Ctrl-C: nobody sees it"
             )
         pace = AtOnce() if options.fast else None
-        show = Show(stream, characters, settings, pace=pace, tell=messages.say)
+        show = Show(stream, characters, settings, pace=pace, session=session, tell=messages.say)
         try:
             with show:
                 _run(show, stream)
         except Interrupted:
-            _tell_kept(show)
+            tell_kept(show)
             raise
-        _tell_kept(show)
+        tell_kept(show)
         traffic = getattr(stream, "traffic", None)
         if traffic is not None and (why := traffic.unused(origin)):
             messages.warn(why)
@@ -78,7 +81,7 @@ def _ends(stream: SkeletonStream) -> TypeGuard[Player]:
     return isinstance(stream, Player) and not stream.loop
 
 
-def _tell_kept(show: Show) -> None:
+def tell_kept(show: Show) -> None:
     """Say of each file what it holds.
 
     Raises:

@@ -25,6 +25,7 @@ Upgrade = Callable[[Json], Json]
 UPGRADES: Mapping[int, Upgrade] = {}
 """For each older version what makes the next one of it."""
 
+_CHARACTER = re.compile(r"[a-z0-9-]{1,40}|characters/[0-9]{1,6}/[^/\\:\0]{1,200}")
 _FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_. -]{0,119}")
 
 
@@ -163,10 +164,18 @@ def _actor(fields: Json) -> Actor:
     return Actor(
         _whole(fields, "id"),
         _text(fields, "name"),
-        _text(fields, "character"),
+        _character(fields),
         _text(fields, "drive"),
         _whole(fields, "nodes"),
     )
+
+
+def _character(fields: Json) -> str:
+    """A built-in character, or a file in the session."""
+    value = _text(fields, "character")
+    if not _CHARACTER.fullmatch(value) or value.endswith(("/.", "/..")):
+        raise InputError(f"the session names no character: {value[:60]!r}")
+    return value
 
 
 def _take(fields: Json, performance: Callable[[str], Performance]) -> Take:

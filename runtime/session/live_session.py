@@ -181,15 +181,6 @@ class LiveSession:
         self.transport.rehearse()
         self.transport.go_to(start)
 
-    def close(self) -> None:
-        """End a take, and save the session.
-
-        Raises:
-            InputError: the disk fails.
-        """
-        self.stop()
-        self.store.close()
-
     def _add(
         self, made: Sequence[tuple[ActorLayers, Performance]], start: float, recording: str
     ) -> None:

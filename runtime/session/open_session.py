@@ -41,8 +41,9 @@ def open_session(
     puppets = [puppet for act in acts for puppet in act.puppets]
     session = store.session
     if not session.actors:
-        for number, puppet in enumerate(puppets, 1):
-            session = with_actor(session, _actor(number, puppet, drive))
+        names = store.characters or [puppet.character.name for puppet in puppets]
+        for number, (puppet, name) in enumerate(zip(puppets, names, strict=True), 1):
+            session = with_actor(session, _actor(number, puppet, name, drive))
         store.versions = Versions(session)
         store.write()
     _check_actors(store.path, session, puppets, drive)
@@ -65,9 +66,9 @@ def open_session(
     )
 
 
-def _actor(number: int, puppet: Puppet, drive: str) -> Actor:
-    character = puppet.character
-    return Actor(number, character.name, character.name, drive, len(character.skeleton.names))
+def _actor(number: int, puppet: Puppet, name: str, drive: str) -> Actor:
+    nodes = len(puppet.character.skeleton.names)
+    return Actor(number, puppet.character.name, name, drive, nodes)
 
 
 def _staged(actor: int, act: Act, puppet: Puppet, match: PuppetMatch) -> StagedActor:

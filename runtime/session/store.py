@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import shutil
+from collections.abc import Sequence
 from pathlib import Path
 
 from devices.errors import InputError
 from devices.skeleton import Skeleton
-from runtime.output.files.whole_file import check_suffix, check_writable
+from runtime.characters.builtin import BUILTIN
+from runtime.characters.side_files import files_of
+from runtime.output.files.whole_file import check_suffix, check_writable, writing
 from runtime.session.archive import SUFFIX, pack, unpack
 from runtime.session.document import Session
 from runtime.session.folder import CHARACTERS, DOCUMENT, PERFORMANCES, RECORDINGS, SessionFolder
@@ -27,6 +31,8 @@ class SessionStore:
         folder: the files of the open session.
         versions: the session with undo and redo.
         notes: what was lost or recovered, a line each.
+        characters: for each actor of a new session its character: a built-in one, or a file in the
+            session; empty where nobody has said.
 
     Raises:
         InputError: it cannot be read or written, or is of a newer version.
@@ -38,6 +44,7 @@ class SessionStore:
         self.path = path
         beside = path.with_name(path.name + UNSAVED)
         self.notes: list[str] = []
+        self.characters: list[str] = []
         recovered = (beside / DOCUMENT).is_file()
         self.folder = SessionFolder(beside)
         session = Session()
@@ -64,12 +71,51 @@ class SessionStore:
             kept = path.with_name(f"{path.stem}-damaged{path.suffix}")
             kept.write_bytes(path.read_bytes())
             self.notes.append(f"the damaged file is kept as {kept}")
+        self._begun, self._recovered = False, recovered
         self._written: Session | None = session if self.folder.exists else None
 
     @property
     def session(self) -> Session:
         """The version that counts now."""
         return self.versions.session
+
+    def adopt(self, characters: Sequence[str]) -> list[str]:
+        """Take the files of characters into a new session; return what to load in their place.
+
+        An older session keeps its own characters.
+
+        Args:
+            characters: built-in ones, or paths; of an older session they may be left out.
+
+        Raises:
+            InputError: a new session gets no character, or a file cannot be copied.
+        """
+        actors = self.session.actors
+        if actors and not characters:
+            return [self._loaded(actor.character) for actor in actors]
+        if not characters:
+            raise InputError(f"{self.path} is a new session: give it a --character")
+        if actors:
+            return list(characters)
+        self.characters = [self._adopted(number, name) for number, name in enumerate(characters, 1)]
+        return list(map(self._loaded, self.characters))
+
+    def _adopted(self, number: int, name: str) -> str:
+        """Copy the files of a character; the name of the first in the session."""
+        if name in BUILTIN:
+            return name
+        files = files_of(Path(name))
+        folder = self.folder.path / CHARACTERS / str(number)
+        for file, inside in files.items():
+            target = folder / inside
+            with writing(target):
+                target.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copyfile(file, target)
+        return f"{CHARACTERS}/{number}/{Path(name).name}"
+
+    def _loaded(self, character: str) -> str:
+        """What loads a character of the session: its name, or its path."""
+        return character if character in BUILTIN else str(self.folder.path / character)
 
     def keep(self, performance: Performance, skeleton: Skeleton) -> None:
         """Write a performance that the session will mention: see `SessionFolder.keep`."""
@@ -82,6 +128,7 @@ class SessionStore:
             InputError: the disk fails; what was written before stays.
         """
         if self._written != self.session:
+            self._begun = True
             self.folder.write(self.session)
             self._written = self.session
 
@@ -103,6 +150,11 @@ class SessionStore:
         """
         self.save()
         self.folder.remove()
+
+    def abandon(self) -> None:
+        """Delete the folder of a session that was never worked on; else leave all as it is."""
+        if not self._begun and not self._recovered:
+            self.folder.remove()
 
     def _files(self) -> list[str]:
         """The files that the version that counts is made of; the JSON first."""

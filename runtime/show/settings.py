@@ -119,7 +119,6 @@ class FileSettings:
         export: the performed character as .glb, .usdc, .usda or .bvh.
         takes: recordings that are started while the show runs are called ``NAME-1.mcap`` and so on
             beside this one; None: beside `record`, or ``take.mcap`` in the current folder.
-        session: a .bunraku file that takes are kept in; it is read if it is there.
 
     Raises:
         InputError: a value is no `Path`; the message names the setting.
@@ -132,10 +131,9 @@ class FileSettings:
     record: Path | None = None
     export: Path | None = None
     takes: Path | None = None
-    session: Path | None = None
 
     def __post_init__(self) -> None:
-        for name in (each.name for each in fields(self)):
+        for name in ("video", "frames", "cache", "report", "record", "export", "takes"):
             _check_path(self, name)
 
 

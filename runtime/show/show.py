@@ -22,6 +22,7 @@ from runtime.output.files.kept_file import Kept
 from runtime.output.output import Output
 from runtime.output.report.report import Report
 from runtime.puppet.puppet import Motion
+from runtime.session.store import SessionStore
 from runtime.show import messages
 from runtime.show.collector_pauses import collector_paused, objects_frozen
 from runtime.show.interrupts import interrupts_deferred
@@ -51,6 +52,7 @@ class Show:
         settings: everything else; the defaults perform without a window, a picture or a file.
         pace: waits between the ticks of `run`; if None, the one that suits the stream.
         outputs: outputs of your own that take each frame of the first character.
+        session: where takes are kept and played from; it is saved and closed with the show.
         context: an OpenGL 3.3 context of your own, in which every tick draws; the show makes it
             current and does not release it. If None, a show that needs pictures makes one.
         make_scene: makes the scene, with the arguments of `Scene`.
@@ -81,6 +83,7 @@ class Show:
         *,
         pace: Pace | None = None,
         outputs: Sequence[Output] = (),
+        session: SessionStore | None = None,
         context: moderngl.Context | None = None,
         make_scene: Callable[..., Scene] = Scene,
         make_driver: DriverFactory | None = None,
@@ -100,6 +103,7 @@ class Show:
                     self.settings,
                     self._closing,
                     outputs=outputs,
+                    session=session,
                     context=context,
                     make_scene=make_scene,
                     make_driver=make_driver,

@@ -95,7 +95,7 @@ def show_settings(options: argparse.Namespace, origin: str) -> ShowSettings:
     return ShowSettings(
         size=options.size,
         window=not options.headless,
-        background=_background(options),
+        background=background_of(options),
         plain=options.plain,
         fps=options.fps,
         match=MatchSettings(
@@ -135,7 +135,8 @@ def _refuse_matching_without_chains(options: argparse.Namespace) -> None:
         )
 
 
-def _background(options: argparse.Namespace) -> Background | None:
+def background_of(options: argparse.Namespace) -> Background | None:
+    """The background that the options ask for; None for the stage."""
     if options.transparent:
         return NOTHING
     return None if options.background is None else Background(*options.background)
@@ -170,13 +171,6 @@ def _add_stage(parser: argparse.ArgumentParser) -> None:
     show = parser.add_argument_group("the show")
     show.add_argument("--headless", action="store_true", help="open no window")
     show.add_argument(
-        "--size",
-        type=size,
-        default=(960, 540),
-        metavar="WxH",
-        help="width and height of the picture in pixels (default 960x540; demo 1280x560)",
-    )
-    show.add_argument(
         "--fast",
         action="store_true",
         help="perform every frame exactly once, as fast as possible",
@@ -190,6 +184,19 @@ def _add_stage(parser: argparse.ArgumentParser) -> None:
     )
     show.add_argument(
         "--loop", action="store_true", help="start a recording again after its last frame"
+    )
+    add_picture_options(parser)
+
+
+def add_picture_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of the picture: its size, and what stands behind the characters."""
+    show = parser.add_argument_group("the picture")
+    show.add_argument(
+        "--size",
+        type=size,
+        default=(960, 540),
+        metavar="WxH",
+        help="width and height of the picture in pixels (default 960x540; demo 1280x560)",
     )
     behind = show.add_mutually_exclusive_group()
     behind.add_argument(

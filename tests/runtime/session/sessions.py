@@ -41,7 +41,7 @@ def take(angle: float, nodes: tuple[int, ...] = (1, 2), **options: float) -> Tak
 
 def session(*takes: Take, start: float = 0.0) -> Session:
     """A session of one actor whose takes all start at the same moment."""
-    made = with_actor(Session(), Actor(1, "chain", "chain.obj", "relative", NODES))
+    made = with_actor(Session(), Actor(1, "chain", "chain", "relative", NODES))
     for each in takes:
         made = with_take(made, each, start)
     return made

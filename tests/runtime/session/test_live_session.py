@@ -18,7 +18,7 @@ from runtime.session import edits
 from runtime.session.store import SessionStore
 from runtime.session.transport import Mode
 from runtime.show.open_stream import play
-from runtime.show.settings import FileSettings, MatchSettings, ShowSettings
+from runtime.show.settings import MatchSettings, ShowSettings
 from runtime.show.show import Show
 
 
@@ -28,9 +28,8 @@ def open_show(
     stream = play(builtin_recording(motion), every_frame=True, loop=True)
     settings = ShowSettings(
         match=MatchSettings(**options),  # type: ignore[arg-type]  # of various types
-        files=FileSettings(session=path),
     )
-    return Show(stream, [load_character(character)], settings)
+    return Show(stream, [load_character(character)], settings, session=SessionStore(path))
 
 
 def ticks(show: Show, count: int) -> list[np.ndarray]:

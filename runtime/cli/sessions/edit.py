@@ -1,0 +1,109 @@
+"""`bunraku edit`: changes a session by a list of edits, without a window."""
+
+from __future__ import annotations
+
+import argparse
+import inspect
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from devices.errors import InputError
+
+if TYPE_CHECKING:
+    from runtime.session.document import Session
+
+HELP = "change a session by a list of edits"
+MOST_BYTES = 16 << 20
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments and options."""
+    parser.add_argument("session", type=Path, metavar="SESSION.bunraku")
+    parser.add_argument(
+        "--script",
+        type=Path,
+        metavar="EDITS.json",
+        help='edits such as [{"edit": "move", "clip": 2, "start": 1.5}]; docs/session.md lists all',
+    )
+    parser.add_argument(
+        "--out",
+        type=Path,
+        metavar="OTHER.bunraku",
+        help="write the changed session here and leave the first one as it is",
+    )
+
+
+def run(options: argparse.Namespace) -> int:
+    """Do the edits, all or none; print what the session holds then."""
+    import shutil
+
+    from runtime.cli.sessions.contents import lines_of
+    from runtime.output.files.whole_file import check_suffix, whole_file
+    from runtime.session.archive import SUFFIX
+    from runtime.session.folder import Opened
+    from runtime.session.store import SessionStore
+
+    path: Path = options.session
+    if not path.is_file():
+        raise InputError(f"there is no session {path}; `bunraku session` makes one")
+    edits = [] if options.script is None else _read(options.script)
+    if options.out is not None:
+        check_suffix(options.out, (SUFFIX,))
+        with whole_file(options.out) as partial:
+            shutil.copyfile(path, partial)
+        path = options.out
+    store = SessionStore(path)
+    try:
+        session = store.session
+        for number, edit in enumerate(edits, 1):
+            session = _edited(session, edit, f"edit {number} of {options.script}")
+        store.versions.do(session, "edit")
+        store.close()
+    except BaseException:
+        store.abandon()
+        raise
+    print("\n".join(lines_of(path, Opened(session, tuple(store.notes)))))
+    return 0
+
+
+def _read(path: Path) -> list[dict[str, Any]]:
+    from devices.bounded_json import parse_json
+    from replay.text_file import file_bytes
+
+    try:
+        edits = parse_json(file_bytes(path, MOST_BYTES))
+    except ValueError as error:
+        raise InputError(f"{path} is no list of edits: {error}") from error
+    if not isinstance(edits, list) or not all(isinstance(edit, dict) for edit in edits):
+        raise InputError(f'{path} is no list of edits such as [{{"edit": "mute", "clip": 1}}]')
+    return edits
+
+
+def _edited(session: Session, edit: dict[str, Any], where: str) -> Session:
+    """The session after one edit.
+
+    Raises:
+        InputError: it names no edit, has other fields than the edit, or cannot be done.
+    """
+    from runtime.session.edits import EDITS
+
+    name = edit.get("edit")
+    if not isinstance(name, str) or name not in EDITS:
+        raise InputError(f"{where}: no edit is called {name!r:.40}; there are: {', '.join(EDITS)}")
+    parameters = list(inspect.signature(EDITS[name]).parameters)[1:]
+    fields = ["take" if name == "rename" else "clip", *parameters[1:]]
+    fields = fields if parameters and parameters[0] == "number" else parameters
+    given = {key: value for key, value in edit.items() if key != "edit"}
+    if set(given) != set(fields):
+        raise InputError(
+            f"{where}: {name!r} takes {', '.join(fields)}; it has {', '.join(given) or 'nothing'}"
+        )
+    values = [
+        tuple(value) if isinstance(value := given[field], list) else value for field in fields
+    ]
+    try:
+        return EDITS[name](session, *values)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from error
+    except (TypeError, ValueError, AttributeError, OverflowError) as error:
+        raise InputError(f"{where}: {name!r} got a value of a wrong kind ({error})") from error

@@ -1,0 +1,77 @@
+"""`bunraku session`: performers record takes into a session, which plays them in layers."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from runtime.cli.live import for_performers, is_camera
+from runtime.cli.options.input_options import add_input_options, stated
+from runtime.cli.options.show_options import add_character_option, add_show_options
+
+if TYPE_CHECKING:
+    from devices.stream import SkeletonStream
+
+HELP = "record takes in layers, play and edit them"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add the command's arguments and options."""
+    parser.add_argument(
+        "session",
+        type=Path,
+        metavar="SESSION.bunraku",
+        help="the session; a new one is made, with the characters that are given",
+    )
+    performer = parser.add_mutually_exclusive_group()
+    performer.add_argument(
+        "--device", metavar="URL", help="a live performer; `bunraku devices` lists the devices"
+    )
+    performer.add_argument(
+        "--recording", type=Path, metavar="FILE", help="a recorded performer, again and again"
+    )
+    add_character_option(parser, required=False)
+    add_input_options(parser)
+    add_show_options(parser)
+
+
+def run(options: argparse.Namespace) -> int:
+    """Perform until the window is closed, or Ctrl-C; the session is saved then."""
+    from runtime.cli.performing import perform
+    from runtime.session.store import SessionStore
+
+    store = SessionStore(options.session)
+    try:
+        options.character = store.adopt(options.character or [])
+        if store.session.actors and options.drive == "auto":
+            options.drive = store.session.actors[0].drive
+        if options.device is not None and is_camera(options.device):
+            options.mirror = True if options.mirror is None else options.mirror
+        origin = options.device or (options.recording.name if options.recording else "nobody")
+        return perform(
+            options,
+            lambda: _source(options),
+            origin=origin,
+            read=[("--recording", options.recording)] if options.recording else [],
+            session=store,
+        )
+    except BaseException:
+        store.abandon()
+        raise
+
+
+def _source(options: argparse.Namespace) -> SkeletonStream:
+    """The performer: live, recorded, or nobody."""
+    from devices.stream import open_stream as open_device
+    from replay.formats import read_recording
+    from runtime.session.nobody import nobody_for
+    from runtime.show.open_stream import play
+
+    if options.device is not None:
+        return open_device(for_performers(options.device, options.performers))
+    if options.recording is not None:
+        recording = read_recording(options.recording, stated(options))
+        loop = options.loop or not options.fast
+        return play(recording, every_frame=options.fast, speed=options.speed, loop=loop)
+    return play(nobody_for(1.0, 60.0), loop=True)
