@@ -32,6 +32,7 @@ def perform(
     origin: str,
     read: Sequence[tuple[str, Path]] = (),
     session: SessionStore | None = None,
+    began: Callable[[Show], None] = lambda _: None,
 ) -> int:
     """Perform the show that the options ask for; the exit code.
 
@@ -41,6 +42,7 @@ def perform(
         origin: the address or name of the stream.
         read: files that are read and must not be written, each with the name of its option.
         session: where takes are kept and played from.
+        began: is called once, after the first frame was performed.
 
     Raises:
         InputError: anything that a user can put right; at the end, also for files that are not
@@ -65,7 +67,7 @@ def perform(
         show = Show(stream, characters, settings, pace=pace, session=session, tell=messages.say)
         try:
             with show:
-                _run(show, stream)
+                _run(show, stream, began)
         except Interrupted:
             tell_kept(show)
             raise
@@ -94,7 +96,7 @@ def tell_kept(show: Show) -> None:
         raise InputError(f"not kept whole: {', '.join(faulty)}")
 
 
-def _run(show: Show, stream: SkeletonStream) -> None:
+def _run(show: Show, stream: SkeletonStream, began: Callable[[Show], None]) -> None:
     total = len(stream.recording) if _ends(stream) else None
     told: dict[str, object] = {}
     if show.settings.window:
@@ -103,6 +105,8 @@ def _run(show: Show, stream: SkeletonStream) -> None:
     with Progress("performing", total) as progress:
 
         def advance() -> None:
+            if show.frames == 1:
+                began(show)
             _tell_parts(show, told)
             progress.advance(said=_milliseconds(show.latency))
 

@@ -12,6 +12,7 @@ from runtime.cli.options.show_options import add_character_option, add_show_opti
 
 if TYPE_CHECKING:
     from devices.stream import SkeletonStream
+    from runtime.show.show import Show
 
 HELP = "record takes in layers, play and edit them"
 
@@ -30,6 +31,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     performer.add_argument(
         "--recording", type=Path, metavar="FILE", help="a recorded performer, again and again"
+    )
+    parser.add_argument(
+        "--take", action="store_true", help="begin a take at once, as pressing r does"
     )
     add_character_option(parser, required=False)
     add_input_options(parser)
@@ -55,10 +59,17 @@ def run(options: argparse.Namespace) -> int:
             origin=origin,
             read=[("--recording", options.recording)] if options.recording else [],
             session=store,
+            began=_begin_take if options.take else lambda _: None,
         )
     except BaseException:
         store.abandon()
         raise
+
+
+def _begin_take(show: Show) -> None:
+    from runtime.control.actions import press
+
+    press("record", show.controls)
 
 
 def _source(options: argparse.Namespace) -> SkeletonStream:

@@ -1,4 +1,4 @@
-"""The commands of a session: session, edit, render and info, from one file to the next."""
+"""The commands of a session, one after the other: session, info, edit and render."""
 
 from __future__ import annotations
 
@@ -7,22 +7,136 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pygltflib import GLTF2
 
-from runtime.characters.open_character import load_character
+from replay.builtin import builtin_recording
+from replay.joint_table import write_joint_table
 from runtime.cli.command_line import main
-from runtime.control.actions import press
-from runtime.output.files.point_cache import read_point_cache
 from runtime.session.store import SessionStore
-from runtime.show.open_stream import open_stream
-from runtime.show.show import Show
-from tests.runtime.session.test_live_session import open_show, record
+from tests.runtime.output.files.test_point_cache import read_pc2
+
+CUBE = """mtllib look.mtl
+v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nv -1 4 -1\nv 1 4 -1\nv 1 4 1\nv -1 4 1
+usemtl a
+f 1 2 3 4\nf 8 7 6 5\nf 1 5 6 2\nf 2 6 7 3\nf 3 7 8 4\nf 4 8 5 1
+"""
 
 
-@pytest.fixture
-def saved(tmp_path: Path) -> Path:
-    """A session of the squid with two takes."""
-    path = tmp_path / "s.bunraku"
-    with open_show(path, "squid") as show:
-        record(show, 30)
-        record(show, 30)
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The built-in wave, as a table."""
+    wave = builtin_recording("wave")
+    path = tmp_path_factory.mktemp("wave") / "wave.csv"
+    with path.open("w", newline="") as file:
+        write_joint_table(file, wave)
     return path
+
+
+@pytest.fixture(scope="module")
+def saved(tmp_path_factory: pytest.TempPathFactory, recording: Path) -> Path:
+    """A session of the squid with two takes."""
+    path = tmp_path_factory.mktemp("saved") / "s.bunraku"
+    performed(path, recording, "--character", "squid")
+    performed(path, recording)
+    return path
+
+
+def performed(path: Path, recording: Path, *options: str) -> None:
+    given = ["session", str(path), "--recording", str(recording), "--take", "--headless", "--fast"]
+    assert main([*given, *options]) == 0
+
+
+def edited(path: Path, out: Path, *edits: dict[str, object]) -> int:
+    script = out.with_suffix(".json")
+    script.write_text(json.dumps(edits))
+    return main(["edit", str(path), "--script", str(script), "--out", str(out)])
+
+
+def cached(path: Path, out: Path, *options: str) -> np.ndarray:
+    assert main(["render", str(path), "--cache", str(out), *options]) == 0
+    return read_pc2(out)[1]
+
+
+def test_info_lists_takes_and_clips(saved: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["info", str(saved)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert sum(line.startswith("take ") for line in lines) == 2
+    assert any(line.startswith("clip        2: 0.00 to") for line in lines)
+
+
+def test_edits_are_done_in_order_and_written_elsewhere(saved: Path, tmp_path: Path) -> None:
+    before, out = saved.read_bytes(), tmp_path / "t.bunraku"
+    assert (
+        edited(
+            saved,
+            out,
+            {"edit": "move", "clip": 2, "start": 1.0},
+            {"edit": "speed", "clip": 2, "speed": 2.0},
+            {"edit": "mark", "time": 1.0, "name": "second"},
+        )
+        == 0
+    )
+    store = SessionStore(out)
+    clip = store.session.clip(2)
+    assert (clip.start, clip.speed) == (1.0, 2.0)
+    assert store.session.marks[0].name == "second"
+    store.close()
+    assert saved.read_bytes() == before
+
+
+@pytest.mark.parametrize(
+    ("edit", "says"),
+    [
+        ({"edit": "fly"}, "no edit is called 'fly'"),
+        ({"edit": "mute", "clip": 1}, "takes clip, on"),
+        ({"edit": "move", "clip": 9, "start": 0.0}, "no clip 9"),
+        ({"edit": "weight", "clip": 1, "weight": 7.0}, "weight is 7.0"),
+        ({"edit": "speed", "clip": 1, "speed": "fast"}, "wrong kind"),
+        ({"edit": "move", "clip": [1], "start": None}, "wrong kind"),
+    ],
+)
+def test_a_wrong_edit_is_refused_in_one_line(
+    saved: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], edit: dict, says: str
+) -> None:
+    assert edited(saved, tmp_path / "t.bunraku", edit) == 2
+    error = capsys.readouterr().err.strip().splitlines()
+    assert len(error) == 1
+    assert says in error[0]
+
+
+def test_render_gives_the_same_bytes_from_any_moment_on(saved: Path, tmp_path: Path) -> None:
+    whole = cached(saved, tmp_path / "a.pc2", "--rate", "30")
+    again = cached(saved, tmp_path / "b.pc2", "--rate", "30", "--from", "0.5")
+    np.testing.assert_array_equal(whole[15:], again)
+    assert np.ptp(whole, axis=0).max() > 0.1
+
+
+def test_an_export_shows_what_the_program_shows(saved: Path, tmp_path: Path) -> None:
+    options = ["--rate", "10", "--to", "1.0", "--export", str(tmp_path / "a.glb")]
+    assert main(["render", str(saved), *options]) == 0
+    assert GLTF2().load(str(tmp_path / "a.glb")).animations
+
+
+def test_a_session_holds_the_files_of_its_characters(tmp_path: Path, recording: Path) -> None:
+    mesh = tmp_path / "in" / "cube.obj"
+    mesh.parent.mkdir()
+    mesh.write_text(CUBE)
+    (mesh.parent / "look.mtl").write_text("newmtl a\nKd 1 0 0\nmap_Kd -s 1 1 1 no picture.png\n")
+    path = tmp_path / "s.bunraku"
+    performed(path, recording, "--character", str(mesh))
+    for file in mesh.parent.iterdir():
+        file.unlink()
+    mesh.parent.rmdir()
+    vertices = cached(path, tmp_path / "a.pc2", "--rate", "10", "--to", "0.5")
+    assert vertices.shape[1] == 8
+    performed(path, recording)
+    assert len(SessionStore(path).session.takes) == 2
+
+
+def test_a_new_session_needs_a_character(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], recording: Path
+) -> None:
+    options = ["--recording", str(recording), "--headless", "--fast"]
+    assert main(["session", str(tmp_path / "s.bunraku"), *options]) == 2
+    assert "give it a --character" in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == []
