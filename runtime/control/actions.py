@@ -6,57 +6,14 @@ tests read the names, texts and ranges of this table and have none of their own.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from enum import Enum
+from collections.abc import Mapping
 
 from runtime.conditioning.switches import SWITCHES
+from runtime.control.action import Action, Kind, switch
+from runtime.control.session_actions import SESSION_ACTIONS
 from runtime.control.show_controls import ShowControls
 from runtime.control.sliders import SLIDERS, STEP, Slider
-from runtime.session.live_session import LiveSession
 from runtime.session.session_takes import record_into
-
-
-class Kind(Enum):
-    """How an action is operated."""
-
-    PRESS = "press"
-    SWITCH = "switch"
-    FADER = "fader"
-
-
-Do = Callable[[ShowControls], None]
-Read = Callable[[ShowControls], float]
-Write = Callable[[ShowControls, float], None]
-
-
-@dataclass(frozen=True, slots=True)
-class Action:
-    """One row of the table.
-
-    Attributes:
-        label: its name on a button.
-        text: what the action does, in a few words.
-        press: does it, as a button or a key does; None for a fader.
-        write: sets its value in [0, 1]; None where there is no value to set.
-        read: returns its value in [0, 1], for a light or a fader; None where there is none.
-        words: says what a press has done, where that is not its label with its state.
-    """
-
-    label: str
-    text: str
-    press: Do | None = None
-    write: Write | None = None
-    read: Read | None = None
-    words: Callable[[ShowControls], str] | None = None
-
-    @property
-    def kind(self) -> Kind:
-        """How the action is operated: a switch can be pressed and set, a fader only set."""
-        if self.press is None:
-            return Kind.FADER
-        return Kind.PRESS if self.write is None else Kind.SWITCH
-
 
 STEPS = {
     "order": ("Order", "dropping late and duplicate frames, on or off"),
@@ -70,22 +27,6 @@ STEPS = {
     "scale": ("One size", "one size for all performers, on or off"),
     "recalibrate": ("T pose", "calibrating by a T or A pose kept still, on or off"),
 }
-
-
-def _switch(
-    label: str,
-    text: str,
-    read: Callable[[ShowControls], bool],
-    write: Callable[[ShowControls, bool], None],
-) -> Action:
-    """Build an action that is on or off: a press reverses it, `write` sets it."""
-    return Action(
-        label,
-        text,
-        press=lambda controls: write(controls, not read(controls)),
-        write=lambda controls, value: write(controls, value >= 0.5),
-        read=lambda controls: float(read(controls)),
-    )
 
 
 def _slider_actions(name: str, slider: Slider) -> dict[str, Action]:
@@ -113,7 +54,7 @@ def _conditioning(name: str, label: str, text: str) -> Action:
     def write(controls: ShowControls, on: bool) -> None:
         controls.conditioning.switch(name, on)
 
-    return _switch(label, text, lambda controls: bool(getattr(controls.conditioning, name)), write)
+    return switch(label, text, lambda controls: bool(getattr(controls.conditioning, name)), write)
 
 
 def _is_paused(controls: ShowControls) -> bool:
@@ -149,33 +90,6 @@ def _record(controls: ShowControls, on: bool) -> None:
         controls.takes.start()
     else:
         controls.takes.stop()
-
-
-def _with_session(do: Callable[[LiveSession], None]) -> Do:
-    """What a press does to the session that is open; it says so where none is."""
-
-    def press(controls: ShowControls) -> None:
-        if controls.session is None:
-            controls.notices.show("no session is open: start with `bunraku session FILE`")
-        else:
-            do(controls.session)
-
-    return press
-
-
-def _rehearse(session: LiveSession) -> None:
-    session.transport.rehearse()
-
-
-def _retake(controls: ShowControls) -> None:
-    if controls.session is not None and not controls.session.recording:
-        controls.session.drop_last()
-        record_into(controls.session, controls.takes, True)
-
-
-def _loop(controls: ShowControls, on: bool) -> None:
-    if controls.playback is not None:
-        controls.playback.loop = on
 
 
 def _freeze(controls: ShowControls, on: bool) -> None:
@@ -272,7 +186,7 @@ ACTIONS: Mapping[str, Action] = {
         "calibrate: the pose is the rest state, floor and sizes are measured anew",
         press=lambda controls: controls.match_controls.calibrate(),
     ),
-    "hold": _switch("Play / pause", "pause or resume playback (a recording)", _is_paused, _pause),
+    "hold": switch("Play / pause", "pause or resume playback (a recording)", _is_paused, _pause),
     "play": Action(
         "Play",
         "resume playback (a recording)",
@@ -286,53 +200,25 @@ ACTIONS: Mapping[str, Action] = {
         read=lambda controls: float(_is_paused(controls)),
     ),
     "home": Action("To the start", "back to the start (a recording)", press=_home),
-    "record": _switch(
+    "record": switch(
         "Record",
         "begin or end a take: the performer goes to a new file",
         _is_recording,
         _record,
     ),
-    "rehearse": Action(
-        "Rehearse",
-        "stop: the performer moves the characters again (a session)",
-        press=_with_session(_rehearse),
-    ),
-    "retake": Action(
-        "Retake", "take the newest take away and record it again (a session)", press=_retake
-    ),
-    "recall": Action(
-        "Keep last",
-        "make a take of the last 30 seconds (a session)",
-        press=_with_session(lambda session: session.recall()),
-    ),
-    "undo": Action(
-        "Undo", "undo the last edit (a session)", press=_with_session(lambda s: s.undo())
-    ),
-    "redo": Action(
-        "Redo", "do again what was undone (a session)", press=_with_session(lambda s: s.redo())
-    ),
-    "save": Action(
-        "Save", "write the session to its file", press=_with_session(lambda s: s.save())
-    ),
-    "loop": _switch(
-        "Loop",
-        "play again from the front at the end, or not",
-        lambda controls: controls.playback is not None and controls.playback.loop,
-        _loop,
-    ),
-    "freeze": _switch(
+    "freeze": switch(
         "Freeze",
         "freeze: characters stand still while the stream goes on",
         lambda controls: controls.loop.frozen,
         _freeze,
     ),
-    "in-place": _switch(
+    "in-place": switch(
         "In place",
         "in place: characters stay where they are, or travel as their performers do",
         lambda controls: controls.selected[0].travel.in_place,
         _in_place,
     ),
-    "blackout": _switch(
+    "blackout": switch(
         "Blackout",
         "blackout: fade to black, and back",
         lambda controls: controls.scene is not None and controls.scene.blackout.target > 0.0,
@@ -348,23 +234,23 @@ ACTIONS: Mapping[str, Action] = {
     ),
     "front": Action("Front", "look from the front again", press=_front),
     "frame-all": Action("Frame all", "frame every character", press=_frame_all),
-    "chains": _switch(
+    "chains": switch(
         "Chains",
         "show or hide the matched chains",
         lambda controls: controls.scene is not None and controls.scene.highlights,
         _chains,
     ),
-    "panel": _switch(
+    "panel": switch(
         "Panel", "show or hide the panel", lambda controls: controls.view.panel, _panel
     ),
-    "sliders": _switch(
+    "sliders": switch(
         "Sliders",
         "show or hide sliders and switches",
         lambda controls: controls.view.sliders,
         _sliders,
     ),
-    "help": _switch("Help", "show or hide all keys", lambda controls: controls.view.help, _help),
-    "full-screen": _switch(
+    "help": switch("Help", "show or hide all keys", lambda controls: controls.view.help, _help),
+    "full-screen": switch(
         "Full screen",
         "fill the screen with the window, or not",
         lambda controls: controls.view.full_screen,
@@ -376,6 +262,7 @@ ACTIONS: Mapping[str, Action] = {
         for name, action in _slider_actions(slider_name, slider).items()
     },
     **{name: _conditioning(name, *STEPS[name]) for name in SWITCHES},
+    **SESSION_ACTIONS,
     "leave": Action("Leave", "leave", press=_leave),
 }
 """Every action by its name. A new action is one more row, and a key in `runtime.control.keys`."""

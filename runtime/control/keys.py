@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
-from runtime.control.actions import ACTIONS, Kind, press
+from runtime.control.action import Kind
+from runtime.control.actions import ACTIONS, press
 from runtime.control.show_controls import ShowControls
 from runtime.control.window import Event, KeyPressed, Resized, Window
 from runtime.show.scene import Scene
@@ -50,6 +51,13 @@ KEYS = {
     "d": "sliders",
     "?": "help",
     "f11": "full-screen",
+    "u": "undo",
+    "y": "redo",
+    "a": "rehearse",
+    "q": "recall",
+    "delete": "retake",
+    "f2": "save",
+    "f3": "loop",
     "escape": "leave",
 }
 """The action of each key."""

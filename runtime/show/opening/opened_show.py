@@ -25,6 +25,11 @@ from runtime.output.report.report import Report
 from runtime.puppet.deformable_surface import Elasticity
 from runtime.puppet.puppet import Puppet
 from runtime.render.camera import front_camera
+from runtime.session.live_session import LiveSession
+from runtime.session.open_session import open_session
+from runtime.session.session_takes import record_into
+from runtime.session.store import SessionStore
+from runtime.session.transport import Mode
 from runtime.show.act_group import Act, ActGroup
 from runtime.show.interrupts import interrupts_deferred
 from runtime.show.loop import FrameLoop
@@ -48,8 +53,8 @@ class OpenedShow:
     """Everything that a `Show` opens; `closing` closes it, in reverse order.
 
     Args:
-        stream, characters, settings, outputs, context, make_scene, make_driver, clock, tell,
-            warn: as of `Show`.
+        stream, characters, settings, outputs, session, context, make_scene, make_driver, clock,
+            tell, warn: as of `Show`.
         closing: closes what was opened, also if the constructor fails.
 
     Attributes:
@@ -74,6 +79,7 @@ class OpenedShow:
         closing: ExitStack,
         *,
         outputs: Sequence[Output],
+        session: SessionStore | None,
         context: moderngl.Context | None,
         make_scene: Callable[..., Scene],
         make_driver: DriverFactory | None,
@@ -82,6 +88,9 @@ class OpenedShow:
         warn: Callable[[str], None],
     ) -> None:
         self._settings, self._closing = settings, closing
+        self._store = session
+        if session is not None:
+            closing.callback(session.close)
         self._clock = clock
         self.notices = Notices(tell, warn, clock)
         self._tell, self._warn = self.notices.tell, self.notices.warn
@@ -255,17 +264,31 @@ class OpenedShow:
         return loop
 
     def _open_controls(self) -> ShowControls:
+        matching = ActGroup(self.acts)
+        session = self._open_session(matching)
+        takes = self.written.open_takes(None if session is None else session.recordings)
+        if session is not None:
+            self._closing.callback(record_into, session, takes, False)
         return ShowControls(
-            match_controls=ActGroup(self.acts),
+            match_controls=matching,
             conditioning=self._conditioning,
             loop=self.loop,
             puppets=self.puppets,
-            takes=self.written.open_takes(),
+            takes=takes,
+            session=session,
             notices=self.notices,
             leave_asked=SecondPress(self._clock),
-            playback=playback_of(self._stream),
+            playback=playback_of(self._stream) if session is None else session.transport,
             scene=self.scene,
         )
+
+    def _open_session(self, matching: ActGroup) -> LiveSession | None:
+        if self._store is None:
+            return None
+        drive, tell, warn = self._settings.match.driver, self._tell, self._warn
+        session = open_session(self._store, self.acts, matching, drive, tell=tell, warn=warn)
+        self.loop.goes_on = lambda: session.transport.mode is not Mode.REHEARSING
+        return session
 
     def status(self) -> ShowStatus:
         """Return the state of the show as it is now."""

@@ -111,13 +111,17 @@ class Written:
         self._outputs[0].extend(self._closing.enter_context(output) for output in own)
         return self._outputs
 
-    def open_takes(self) -> Takes:
+    def open_takes(self, folder: Path | None = None) -> Takes:
         """Open takes that may be started, and the recording of the whole show if it was asked for.
+
+        Args:
+            folder: where takes are written; None for where the settings say.
 
         Raises:
             InputError: the recording cannot be opened.
         """
         files = self._settings.files
+        usual = files.takes or files.record or Path("take.mcap")
         recorder = None
         if files.record is not None:
             set_aside(files.record, self._notices.warn)
@@ -125,7 +129,7 @@ class Written:
             self._closing.callback(self.report.kept, recorder)  # once it is closed
         self.takes = Takes(
             self._stream,
-            files.takes or files.record or Path("take.mcap"),
+            usual if folder is None else folder / usual.name,
             self._open_recorder,
             tell=self._notices.tell,
             warn=self._notices.warn,

@@ -16,6 +16,7 @@ from runtime.characters.character import Character
 from runtime.conditioning.switches import SWITCHES
 from runtime.control.actions import ACTIONS
 from runtime.control.keys import KEYS
+from runtime.control.session_actions import SESSION_ACTIONS
 from runtime.control.sliders import SLIDERS
 from runtime.puppet.deformable_surface import Elasticity
 from runtime.show.scene import BLACKOUT
@@ -65,6 +66,7 @@ TRIED_HERE = {
     "match-again", "accept", "next-match", "previous-match", "rest-pose", "calibrate", "hold",
     "play", "pause", "home", "record", "freeze", "in-place", "blackout", "frame-all", "chains",
     "select", "keep-match", "front", "panel", "sliders", "help", "full-screen", "leave", *FADERS,
+    *SESSION_ACTIONS,
     *(f"{name}-{way}" for name in FADERS for way in ("up", "down")), *SWITCHES,
 }  # fmt: skip
 
@@ -353,3 +355,23 @@ def test_without_a_theatre_what_is_seen_cannot_be_changed_and_harms_nothing(
     show.controls.scene = None
     press(show, "blackout", "chains", "frame-all")
     assert light(show, "blackout") == light(show, "chains") == 0.0
+
+
+@pytest.mark.parametrize("name", sorted(set(SESSION_ACTIONS) - {"loop"}))
+def test_without_a_session_its_actions_change_nothing_and_say_so(
+    show: StagedShow, name: str
+) -> None:
+    """tests/runtime/session tries them in one."""
+    perform(show)
+    before = show.puppet.snapshot()
+    press(show, name)
+    assert "no session is open" in show.controls.notices.current[-1].text
+    assert not show.controls.takes.recording
+    assert show.puppet.snapshot().targets is before.targets
+
+
+def test_a_recording_loops_or_not(show: StagedShow) -> None:
+    put(show, "loop", 0.0)
+    assert light(show, "loop") == 0.0
+    press(show, "loop")
+    assert light(show, "loop") == 1.0

@@ -1,0 +1,75 @@
+"""The actions on the session that is open: takes, undo, and how its time goes by."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from runtime.control.action import Action, Do, switch
+from runtime.control.show_controls import ShowControls
+from runtime.session.live_session import LiveSession
+from runtime.session.session_takes import record_into
+
+NO_SESSION = "no session is open: start with `bunraku session FILE`"
+
+
+def _with_session(do: Callable[[LiveSession], None]) -> Do:
+    """What a press does to the session that is open; it says so where none is."""
+
+    def press(controls: ShowControls) -> None:
+        if controls.session is None:
+            controls.notices.show(NO_SESSION)
+        else:
+            do(controls.session)
+
+    return press
+
+
+def _rehearse(session: LiveSession) -> None:
+    session.transport.rehearse()
+
+
+def _retake(controls: ShowControls) -> None:
+    session = controls.session
+    if session is None:
+        controls.notices.show(NO_SESSION)
+    elif not session.recording:
+        session.drop_last()
+        record_into(session, controls.takes, True)
+
+
+def _loop(controls: ShowControls, on: bool) -> None:
+    if controls.playback is not None:
+        controls.playback.loop = on
+
+
+SESSION_ACTIONS: Mapping[str, Action] = {
+    "rehearse": Action(
+        "Rehearse",
+        "stop: the performer moves the characters again (a session)",
+        press=_with_session(_rehearse),
+    ),
+    "retake": Action(
+        "Retake", "take the newest take away and record it again (a session)", press=_retake
+    ),
+    "recall": Action(
+        "Keep last",
+        "make a take of the last 30 seconds (a session)",
+        press=_with_session(lambda session: session.recall()),
+    ),
+    "undo": Action(
+        "Undo", "undo the last edit (a session)", press=_with_session(lambda s: s.undo())
+    ),
+    "redo": Action(
+        "Redo", "do again what was undone (a session)", press=_with_session(lambda s: s.redo())
+    ),
+    "save": Action(
+        "Save", "write the session to its file", press=_with_session(lambda s: s.save())
+    ),
+    "loop": switch(
+        "Loop",
+        "play again from the front at the end, or not",
+        lambda controls: controls.playback is not None and controls.playback.loop,
+        _loop,
+    ),
+}
+"""The rows of the table of actions that are for sessions."""
