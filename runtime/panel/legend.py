@@ -5,7 +5,7 @@ from __future__ import annotations
 from imgui_bundle import ImVec2, imgui
 
 from runtime.control.show_controls import ShowControls
-from runtime.panel.widgets import Colour, card, dot
+from runtime.panel.widgets import Colour, card, dot, fitted
 from runtime.render.tubes import PAIR_COLOURS
 from runtime.status.show_status import CharacterStatus, ShowStatus
 
@@ -14,26 +14,42 @@ FULL_GAIN = 0.995  # from which a gain is not worth a word
 
 
 def draw_legend(
-    status: ShowStatus, controls: ShowControls, margin: float, scale: float, top: float
+    status: ShowStatus,
+    controls: ShowControls,
+    margin: float,
+    scale: float,
+    top: float,
+    above: float,
 ) -> None:
-    """Draw the legend from `top` [px] on; a character's name in it selects that character."""
-    with card("legend", margin, max(top, margin), WIDTH * scale, opacity=0.55):
+    """Draw the legend between `top` and `above` the lower border of the picture, both [px].
+
+    It lists the parts of the selected character, or of the first, and the names of the others; a
+    click on a name selects that character. It scrolls where there are too many.
+    """
+    top = max(top, margin)
+    most = imgui.get_io().display_size.y - above - top
+    with card("legend", margin, top, WIDTH * scale, opacity=0.55, most=most):
         for number, character in enumerate(status.characters):
-            _draw_character(number, character, controls, scale)
+            _draw_name(number, status, controls)
+            if number == (controls.match_controls.selected or 0):
+                _draw_parts(character, scale)
 
 
-def _draw_character(
-    number: int, character: CharacterStatus, controls: ShowControls, scale: float
-) -> None:
-    """The name of a character, which a click selects, and its parts below it."""
-    several = len(controls.puppets) > 1
-    selected = several and controls.match_controls.selected == number
-    if several:
-        pressed, _ = imgui.selectable(f"{character.name}##{number}", selected)
-        if pressed:
-            controls.select(None if selected else number)
-    else:
-        imgui.text(character.name)
+def _draw_name(number: int, status: ShowStatus, controls: ShowControls) -> None:
+    """The name of a character; where there are several, a click selects it, or all again."""
+    name = fitted(status.characters[number].name, imgui.get_content_region_avail().x)
+    if len(status.characters) == 1:
+        imgui.text(name)
+        return
+    selected = controls.match_controls.selected == number
+    pressed, _ = imgui.selectable(f"{name}##{number}", selected)
+    if selected and not imgui.is_item_visible():
+        imgui.set_scroll_here_y()
+    if pressed:
+        controls.select(None if selected else number)
+
+
+def _draw_parts(character: CharacterStatus, scale: float) -> None:
     imgui.indent()
     if not character.parts:
         imgui.text_disabled("nothing yet")
@@ -43,7 +59,7 @@ def _draw_character(
         imgui.same_line(0.0, 5.0 * scale)
         imgui.text_disabled("to")
         imgui.same_line(0.0, 5.0 * scale)
-        imgui.text(target)
+        imgui.text(fitted(target, imgui.get_content_region_avail().x))
         if way:
             imgui.same_line()
             imgui.text_disabled(way)

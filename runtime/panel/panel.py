@@ -74,7 +74,7 @@ class Panel:
             inset = 0.0 if controls.scene is None else controls.scene.inset_side
             draw_status(status, inset + margin, scale, margin)
             above = draw_bar(status, controls, margin, scale)
-            draw_legend(status, controls, margin, scale, inset)
+            draw_legend(status, controls, margin, scale, inset, above)
             if controls.view.sliders:
                 draw_sliders(controls, margin, scale)
         draw_countdown(status, scale)

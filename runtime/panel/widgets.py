@@ -25,11 +25,19 @@ KEY_OF = {name: key for key, name in KEYS.items()}
 
 @contextmanager
 def card(
-    name: str, left: float, top: float, width: float, height: float = 0.0, *, opacity: float = 0.84
+    name: str,
+    left: float,
+    top: float,
+    width: float,
+    height: float = 0.0,
+    *,
+    opacity: float = 0.84,
+    most: float | None = None,
 ) -> Iterator[None]:
     """A window without a frame, at a place of the picture [px]; as high as it needs where 0.
 
-    A negative `left` or `top` counts from the other side.
+    A negative `left` or `top` counts from the other side. One that would be higher than `most` [px]
+    scrolls.
     """
     screen = imgui.get_io().display_size
     pivot = ImVec2(float(left < 0.0), float(top < 0.0))
@@ -37,7 +45,11 @@ def card(
     imgui.set_next_window_pos(at, imgui.Cond_.always, pivot)
     imgui.set_next_window_size(ImVec2(width, height))
     imgui.set_next_window_bg_alpha(opacity)
-    imgui.begin(name, None, FIXED)
+    flags = FIXED
+    if most is not None:
+        imgui.set_next_window_size_constraints(ImVec2(width, 0.0), ImVec2(width, max(most, 1.0)))
+        flags &= ~imgui.WindowFlags_.no_scrollbar
+    imgui.begin(name, None, flags)
     try:
         yield
     finally:
@@ -107,6 +119,15 @@ def dot(colour: Colour, radius: float) -> None:
     imgui.get_window_draw_list().add_circle_filled(middle, radius, shade)
     imgui.dummy(ImVec2(2.0 * radius, line))
     imgui.same_line()
+
+
+def fitted(text: str, width: float) -> str:
+    """A text that is no wider than `width` [px]: its end is left out where it would be."""
+    if imgui.calc_text_size(text).x <= width:
+        return text
+    while text and imgui.calc_text_size(f"{text}…").x > width:
+        text = text[:-1]
+    return f"{text}…"
 
 
 @contextmanager

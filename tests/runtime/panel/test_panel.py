@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import moderngl
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from replay.player import EveryFrame, Player
 from runtime.control.actions import ACTIONS
 from runtime.control.show_controls import ShowControls
+from runtime.driving.driver import RELATIVE, DrivenPart
 from runtime.panel.panel import Panel
 from runtime.status.show_status import ShowStatus
 from tests.runtime.staged import StagedShow
@@ -28,7 +30,11 @@ class Screen:
     def __init__(self, context: moderngl.Context, show: StagedShow) -> None:
         self.now = 0.0
         self.target = context.simple_framebuffer(SIZE, components=4)
-        self.panel = Panel(context, show.controls, show._opened.status, clock=lambda: self.now)
+        self.status = show._opened.status
+        self.panel = Panel(context, show.controls, self._newest, clock=lambda: self.now)
+
+    def _newest(self) -> ShowStatus:
+        return self.status()
 
     def draw(self, frames: int = 2) -> NDArray[np.uint8]:
         """Draw so many pictures a fifth of a second apart; the last, upper row first."""
@@ -78,6 +84,28 @@ def test_the_panel_leaves_the_middle_of_the_stage_free(screen: Screen) -> None:
     over = covered(screen.draw())
     assert 0.05 < over.mean() < 0.45
     assert not over[250:560, 400:1250].any()
+
+
+def test_the_legend_of_many_characters_leaves_the_bar_free(
+    screen: Screen, show: StagedShow
+) -> None:
+    status = show._opened.status()
+    bar = slice(_top_of_bar(screen.draw()), None)
+    before = screen.draw()[bar].copy()
+    part = DrivenPart(
+        "left leg", "tentacle 4 of 8, the upper one on the left", (0,), (0,), RELATIVE
+    )
+    many = [replace(status.characters[0], name=f"squid {n}", parts=[part] * 8) for n in range(30)]
+    screen.status = lambda: replace(status, characters=many)
+    after = screen.draw()
+    np.testing.assert_array_equal(after[bar], before)
+    assert not covered(after)[bar.start - 4 : bar.start].any(), "something lies above the bar"
+    assert covered(after)[bar.start - 60 : bar.start - 20, 20:240].all(), "the room is used"
+
+
+def _top_of_bar(picture: NDArray[np.uint8]) -> int:
+    """The first row [px] of the bar, where nothing else is."""
+    return 300 + int(np.flatnonzero(covered(picture)[300:, 640]).min())
 
 
 def test_a_hidden_panel_draws_nothing(screen: Screen, show: StagedShow) -> None:
