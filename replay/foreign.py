@@ -10,15 +10,12 @@ _HINTS = {
     ".dae": ("COLLADA", _BLENDER_BVH),
     ".blend": ("Blender file", "open it in Blender and export BVH (File, Export, Motion Capture)"),
     ".vmd": ("MikuMikuDance motion", "open it in Blender with mmd_tools and export BVH"),
-    ".asf": ("ASF/AMC", "convert the pair to BVH with amc2bvh, or import it into Blender"),
-    ".amc": ("ASF/AMC", "convert the pair to BVH with amc2bvh, or import it into Blender"),
-    ".mvnx": ("Xsens MVNX", "export BVH from Xsens MVN (File, Export)"),
-    ".mvn": ("Xsens MVN", "export BVH from Xsens MVN (File, Export)"),
+    ".mvn": ("Xsens MVN", "export MVNX or BVH from Xsens MVN (File, Export)"),
     ".npz": (
         "NumPy archive",
         "convert SMPL or AMASS motion to BVH with the SMPL add-on of Blender",
     ),
-    ".tak": ("OptiTrack take", "export BVH from Motive (File, Export Tracking Data)"),
+    ".tak": ("OptiTrack take", "export a table (CSV) from Motive (File, Export Tracking Data)"),
     ".usd": ("USD", _BLENDER_BVH),
     ".abc": ("Alembic", "it holds no skeleton; export the motion as BVH where it was made"),
 }
@@ -26,16 +23,9 @@ _STARTS = (
     (b"Kaydara FBX Binary", ".fbx"),
     (b"; FBX", ".fbx"),
     (b"Vocaloid Motion Data", ".vmd"),
-    (b"# AST/ASF", ".asf"),
-    (b":FULLY-SPECIFIED", ".amc"),
     (b"BLENDER", ".blend"),
 )
-_INSIDE = ((b"<COLLADA", ".dae"), (b"<mvnx", ".mvnx"), (b'"people"', "openpose"))
-_HINTS["openpose"] = (
-    "OpenPose JSON",
-    "its points are flat; lift them to 3D and save them as MediaPipe's landmarks",
-)
-_HINTS["optitrack"] = ("OptiTrack table", "export BVH from Motive (File, Export Tracking Data)")
+_INSIDE = ((b"<COLLADA", ".dae"),)
 
 
 def conversion_hint(path: Path, head: bytes) -> str | None:
@@ -48,7 +38,5 @@ def conversion_hint(path: Path, head: bytes) -> str | None:
     start = head.lstrip(b"\xef\xbb\xbf \t\r\n")
     kind = next((kind for mark, kind in _STARTS if start.startswith(mark)), None)
     kind = kind or next((kind for mark, kind in _INSIDE if mark in head), None)
-    if kind is None and start.startswith(b"Format Version,"):
-        kind = "optitrack"
     what = _HINTS.get(kind or path.suffix.lower())
     return None if what is None else f"{what[0]} is not read; {what[1]}"

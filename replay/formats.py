@@ -28,6 +28,10 @@ from replay.mcap.reader import read_mcap, recognises_mcap
 from replay.mediapipe.reader import read_mediapipe, recognises_mediapipe
 from replay.recording import Recording
 from replay.stated import UNSTATED, Stated
+from replay.studio.amc import read_amc, recognises_amc
+from replay.studio.mvnx import read_mvnx, recognises_mvnx
+from replay.studio.openpose import read_openpose, recognises_openpose
+from replay.studio.optitrack import read_optitrack, recognises_optitrack
 from replay.studio.smpl import read_smpl, recognises_smpl
 from replay.text_file import decoded, without_mark
 
@@ -62,7 +66,8 @@ class RecordingFormat:
         Raises:
             InputError: it is not a file, is damaged, or leaves nothing open that is stated.
         """
-        check_recordable(path)
+        if not path.is_dir():
+            check_recordable(path)
         try:
             recording = self.reader(path, stated)
         except ContentError as error:
@@ -117,6 +122,10 @@ def formats() -> tuple[RecordingFormat, ...]:
         RecordingFormat("SMPL motion, AMASS (.npz)", recognises_smpl, read_smpl),
         RecordingFormat("markers, C3D", recognises_c3d, read_c3d),
         RecordingFormat("markers, TRC", recognises_trc, read_trc),
+        RecordingFormat("OptiTrack table (CSV)", recognises_optitrack, read_optitrack),
+        RecordingFormat("Acclaim ASF/AMC", recognises_amc, read_amc),
+        RecordingFormat("Xsens MVNX", recognises_mvnx, read_mvnx),
+        RecordingFormat("OpenPose key points", recognises_openpose, read_openpose),
         RecordingFormat("BVH", recognises_bvh, read_bvh),
     )
 
@@ -127,6 +136,8 @@ def recognise(path: Path) -> RecordingFormat:
     Raises:
         InputError: the file does not exist, cannot be read, or has an unknown format.
     """
+    if path.is_dir() and recognises_openpose(path, b""):
+        return next(kind for kind in formats() if kind.recognises is recognises_openpose)
     check_recordable(path)
     try:
         with path.open("rb") as file:

@@ -40,6 +40,7 @@ _UNITS = (  # name, metres, and the plausible heights [m] of a person in that un
     ("CMU units of 1/0.45 inch", 0.0254 / 0.45, (1.3, 2.1)),
 )
 _USUAL_HEIGHT = 1.7  # [m] of a person if no unit gives a plausible height
+_NO_TURN = 1e-9  # length of a quaternion that says nothing
 _CREATURE_SIZES = (0.3, 10.0)  # [m] plausible sizes of other bodies
 
 
@@ -140,7 +141,8 @@ def _on_stage(
     moved -= floor_and_start(moved, hips_joint(skeleton))
     turned = None
     if rotations is not None:
-        known: NDArray[np.bool_] = np.logical_and.reduce(np.isfinite(rotations), axis=2)
+        length = np.linalg.norm(rotations, axis=2)
+        known = (length > _NO_TURN) & np.isfinite(length)
         turned = followed_by(rotations, turn, known=known)
     return moved, turned, _rest(skeleton, scale, motion.up, moved, notes)
 

@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.bodies.joint_labels import label_joints
-from devices.bodies.skeleton_on_humanoid import JointOnHumanoid, at, skeleton_on_humanoid
+from devices.bodies.skeleton_on_humanoid import at
+from devices.bodies.t_pose import t_pose_of
 from devices.errors import ContentError
+from devices.printable import printable
 from devices.skeleton import Skeleton
 from replay.bounds import check_poses
 from replay.markers.joint_centres import joint_centres, missing_parts
@@ -68,6 +70,7 @@ def body_of_markers(motion: MarkerMotion, stated: Stated, notes: list[str]) -> R
     notes.append(f"{len(joints)} joints from {len(subject.markers)} of {len(motion.names)} markers")
     positions = np.stack(list(joints.values()), axis=1)
     skeleton = _rest(list(joints), positions)
+    positions = np.stack([joints[name] for name in skeleton.names], axis=1)
     up = motion.up if stated.up_axis is None else stated.up_axis
     return staged(
         JointMotion(
@@ -114,27 +117,7 @@ def _rest(names: list[str], positions: Array) -> Skeleton:
                 if side + bone in names:
                     points[side + bone] = at(above, side + bone)
                     above = side + bone
-    return _with_lengths(points, {name: positions[:, names.index(name)] for name in points}, names)
-
-
-def _with_lengths(
-    points: dict[str, JointOnHumanoid], tracks: dict[str, Array], order: list[str]
-) -> Skeleton:
-    human = skeleton_on_humanoid(points)
-    rest: dict[str, Array] = {}
-    for number, name in enumerate(human.names):
-        parent = int(human.parents[number])
-        if parent < 0:
-            rest[name] = np.zeros(3)
-            continue
-        above = human.names[parent]
-        bone = human.rest_positions[number] - human.rest_positions[parent]
-        lengths = np.linalg.norm(tracks[name] - tracks[above], axis=1)
-        lengths = lengths[np.isfinite(lengths)]
-        usual = float(np.median(lengths)) if lengths.size else 0.0
-        rest[name] = rest[above] + bone * (usual / np.linalg.norm(bone))
-    parents = [order.index(points[name][0]) if points[name][0] else -1 for name in order]
-    return Skeleton(tuple(order), np.array(parents), np.array([rest[name] for name in order]))
+    return t_pose_of(points, {name: positions[:, names.index(name)] for name in points})
 
 
 def _standing(skeleton: Skeleton, positions: Array, up: Array | None, notes: list[str]) -> Array:
@@ -158,7 +141,7 @@ def _name(axis: Array) -> str:
 
 def _unknown(names: list[str], lacking: str) -> str:
     """What a file's markers are, and what they would have to be."""
-    some = ", ".join(name[:_MOST_LETTERS] for name in names[:_MOST_NAMED])
+    some = ", ".join(printable(name, _MOST_LETTERS) for name in names[:_MOST_NAMED])
     more = ", ..." if len(names) > _MOST_NAMED else ""
     return (
         f"its {len(names)} markers ({some}{more}) are no set that is known: it lacks {lacking}; "

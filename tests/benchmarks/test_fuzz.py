@@ -20,6 +20,7 @@ from tests.replay.kinect.test_tables import POSES
 from tests.replay.kinect.test_tables import azure as azure_json
 from tests.replay.markers.marked_bodies import c3d_bytes, marked, trc_text
 from tests.replay.mediapipe.test_reader import POSE
+from tests.replay.studio.studio_files import motive_bones, motive_table, mvnx_text, openpose_json
 from tests.runtime.cli.program import BUNRAKU, ENVIRONMENT
 from tests.thorough import THOROUGH
 
@@ -40,6 +41,9 @@ def other_recordings(folder: Path) -> Iterator[Path]:
         "markers.c3d": c3d_bytes(markers),
         "integers.c3d": c3d_bytes(markers, scale=0.1, processor=86, analogue=2),
         "markers.trc": trc_text(markers),
+        "motive.csv": motive_table({n: t[:3] for n, t in motive_bones().items()}, "Bone"),
+        "suit.mvnx": mvnx_text(2),
+        "people_keypoints.json": openpose_json((0.0, {}), (90.0, {})),
     }
     for name, content in made.items():
         path = folder / name

@@ -18,11 +18,7 @@ from runtime.characters.character_file import read_character
         ("walk", b"Kaydara FBX Binary  \0\x1a\0", "FBX is not read"),
         ("a.fbx", b"; FBX 7.4.0 project file\n", "FBX is not read"),
         ("a.vmd", b"Vocaloid Motion Data 0002\0", "mmd_tools"),
-        ("a.amc", b"#!OML:ASF\n:FULLY-SPECIFIED\n", "ASF/AMC is not read"),
-        ("a.mvnx", b'<?xml version="1.0"?>\n<mvnx version="4">', "Xsens MVN"),
         ("a.dae", b"<?xml?><COLLADA>", "COLLADA is not read"),
-        ("a.json", b'{"version":1.3,"people":[{"pose_keypoints_2d":[1,2,3]}]}', "OpenPose"),
-        ("a.csv", b"Format Version,1.23,Take Name,a\n", "Motive"),
         ("a.npz", b"PK\3\4", "NumPy archive"),
     ],
 )

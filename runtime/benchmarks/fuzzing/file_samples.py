@@ -82,6 +82,52 @@ end_header
 3 0 1 2
 4 0 1 2 3
 """
+SKELETON = b"""# AST/ASF file
+:units
+  length 0.45
+  angle deg
+:root
+  order TX TY TZ RX RY RZ
+  axis XYZ
+  position 0 0 0
+  orientation 0 0 0
+:bonedata
+  begin
+    id 1
+    name thorax
+    direction 0 1 0
+    length 8
+    axis 0 0 20 XYZ
+    dof rx ry rz
+  end
+  begin
+    id 2
+    name head
+    direction 0 1 0
+    length 4
+    axis 0 0 0 XYZ
+    dof rx
+  end
+:hierarchy
+  begin
+    root thorax
+    thorax head
+  end
+"""
+"""The skeleton of `MOTION`."""
+
+MOTION = b"""#!OML:ASF a.asf
+:FULLY-SPECIFIED
+:DEGREES
+1
+root 0 15 0 0 0 0
+thorax 0 1 2
+head 3
+2
+root 1 15 0.5 0 10 1e-3
+thorax 4 5 6
+head -7.5
+"""
 _STL = """solid a
  facet normal 0 0 1
   outer loop

@@ -23,6 +23,8 @@ from replay.builtin import builtin_recording
 from replay.formats import read_recording
 from runtime.benchmarks.fuzzing.file_samples import (
     MAPPING,
+    MOTION,
+    SKELETON,
     TEXTURED,
     character_samples,
     pictures,
@@ -76,6 +78,7 @@ def subjects(folder: Path, recordings: Sequence[Path], characters: Sequence[Path
     shapes = [*character_samples(), *map(_content, characters)]
     return [
         *(_of_file(folder / name, data, _recording) for name, data in motions),
+        *_acclaim(folder),
         *(_of_file(folder / name, data, _character) for name, data in shapes),
         _of_file(folder / "mapping.json", MAPPING, _mapping),
         *(_picture(folder / f"textures-{kind}", data) for kind, data in pictures().items()),
@@ -92,6 +95,22 @@ def _content(path: Path) -> tuple[str, bytes]:
 
 def _of_file(path: Path, sample: bytes, read: Callable[[Path], None]) -> Subject:
     return Subject(path.name, (sample,), lambda _: read(path), path)
+
+
+def _acclaim(folder: Path) -> list[Subject]:
+    """A motion beside its skeleton, and a skeleton beside its motion."""
+    return [
+        _half(folder / "motion", "a.amc", MOTION, SKELETON),
+        _half(folder / "bones", "a.asf", SKELETON, MOTION),
+    ]
+
+
+def _half(folder: Path, name: str, sample: bytes, partner: bytes) -> Subject:
+    folder.mkdir()
+    motion = folder / "a.amc"
+    for half in (motion, folder / "a.asf"):
+        half.write_bytes(sample if half.name == name else partner)
+    return Subject(name, (sample,), lambda _: _recording(motion), folder / name)
 
 
 def _picture(folder: Path, sample: bytes) -> Subject:
