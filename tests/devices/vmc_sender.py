@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from pythonosc.osc_bundle import OscBundle
 from pythonosc.osc_bundle_builder import IMMEDIATELY, OscBundleBuilder
 from pythonosc.osc_message import OscMessage
 from pythonosc.osc_message_builder import OscMessageBuilder
@@ -24,12 +25,17 @@ def message(address: str, *arguments: object) -> OscMessage:
     return builder.build()
 
 
-def bundle(messages: Sequence[OscMessage], timetag: float = IMMEDIATELY) -> bytes:
-    """One bundle; its time tag in seconds since 1970."""
+def built(messages: Sequence[OscMessage], timetag: float = IMMEDIATELY) -> OscBundle:
+    """One bundle as python-osc's clients send it; its time tag in seconds since 1970."""
     builder = OscBundleBuilder(timetag)
     for one in messages:
         builder.add_content(one)
-    return builder.build().dgram
+    return builder.build()
+
+
+def bundle(messages: Sequence[OscMessage], timetag: float = IMMEDIATELY) -> bytes:
+    """The bytes of one bundle; its time tag in seconds since 1970."""
+    return built(messages, timetag).dgram
 
 
 def unity(rotation: Rotation) -> list[float]:

@@ -29,7 +29,7 @@ from tests.devices.osc.nimate_bodies import (
     standing,
 )
 from tests.devices.sender_packets import NIMATE, STEP, SYNC, animata, nimate, osceleton, skelecaster
-from tests.devices.vmc_sender import bundle, message
+from tests.devices.vmc_sender import built, bundle, message
 from tests.waiting import PATIENCE
 
 
@@ -301,9 +301,7 @@ def test_through_a_socket_from_python_osc_s_own_client() -> None:
         assert isinstance(stream, LiveStream)
         port: int = stream.transport.port
         with SimpleUDPClient("127.0.0.1", port) as client:
-            for one in nimate(body() + FAR, what="place"):
-                client.send_message(one.address, one.params)
-            client.send_message("/NI_mate_sync", 1.0)
+            client.send(built([*nimate(body() + FAR, what="place"), SYNC]))
         assert stream.wait(PATIENCE)
         (frame,) = stream.poll()
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:

@@ -1,4 +1,4 @@
-"""The window, where there is a display: xvfb-run makes one."""
+"""The window: what it shows, and what keys and mouse do to it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tests.waiting import PATIENCE
 
 
 @pytest.fixture
-def window() -> object:
+def window(display: None) -> object:
     try:
         window = Window("Bunraku", (320, 180))
     except InputError as error:
