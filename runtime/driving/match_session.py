@@ -17,9 +17,9 @@ from runtime.driving.choices import Choices
 from runtime.driving.driver import DrivenPart
 from runtime.driving.drivers import DriverFactory
 from runtime.driving.mapping import Mapping
+from runtime.driving.matching.puppet_match import PuppetMatch, PuppetMatchState
 from runtime.driving.performer import Performer, Pose, Rest, rest_state
 from runtime.driving.polyline_driver import PolylineDriver
-from runtime.driving.puppet_match import PuppetMatch, PuppetMatchState
 from runtime.driving.reach import Reach
 from runtime.puppet.puppet import Puppet
 from solvers.retarget.limb_shapes import most_different_poses

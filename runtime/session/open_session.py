@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from devices.errors import InputError
-from runtime.driving.puppet_match import PuppetMatch
+from runtime.driving.matching.puppet_match import PuppetMatch
 from runtime.puppet.puppet import Puppet
 from runtime.session.document import Actor, Session
 from runtime.session.edits import with_actor

@@ -47,7 +47,7 @@ REMEMBERS = {
     "runtime.driving.body.body_driver.BodyDriver",
     "runtime.driving.body.footing.Footing",
     "runtime.driving.polyline_driver.SkinnedPolylineDriver",
-    "runtime.driving.puppet_match.PuppetMatch",
+    "runtime.driving.matching.puppet_match.PuppetMatch",
     "runtime.driving.unfreeze_blend.UnfreezeBlend",
     "runtime.puppet.deformable_surface.DeformableSurface",
     "runtime.puppet.puppet.Puppet",

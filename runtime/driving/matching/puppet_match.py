@@ -13,19 +13,16 @@ from devices.errors import InputError
 from runtime.driving.choices import Candidate, Choices
 from runtime.driving.driver import DrivenPart, Driver, MappedDriver
 from runtime.driving.drivers import DriverFactory, best_driver, matched_driver
-from runtime.driving.mapping import Drive, Mapping
+from runtime.driving.mapping import Mapping
+from runtime.driving.matching.mapping_choice import MappingChoice
 from runtime.driving.pairing import Pairing
 from runtime.driving.performer import Performer, Pose, Rest
-from runtime.driving.polyline_driver import STRAIGHT_ON
 from runtime.driving.reach import Reach, reach_of
 from runtime.driving.turn_limits import box_of, corners_of, limit_turns
 from runtime.puppet.puppet import Puppet
-from solvers.matching import SIZE_PREFERENCE, Match, TargetHierarchy
-from solvers.retarget.limb_shapes import shape_likeness
 from solvers.retarget.match_hysteresis import MatchHysteresis, MatchHysteresisState
 from solvers.retarget.source_limbs import SimplifiedSource
 
-CANDIDATES = 20  # matches that can be cycled through
 OF_ANATOMY = 1.0  # [s] at most that a performer is seen before the anatomy's choice performs
 
 Array = NDArray[np.float64]
@@ -85,11 +82,10 @@ class PuppetMatch:
     ) -> None:
         self.puppet = puppet
         self.rest: Rest | None = None
-        self._performer, self._source = performer, source
+        self._performer = performer
         self._choices, self._by_hand = choices, by_hand
         self._clip: Sequence[Pose] = ()
-        self._hierarchy = TargetHierarchy(puppet.bound_skeleton.tree, puppet.bound_skeleton.root)
-        self._hierarchy.rank(source, STRAIGHT_ON, limit=1)  # so that no frame waits for a compiler
+        self._mapping_choice = MappingChoice(performer, source, puppet, choices, by_hand)
         self._hysteresis = MatchHysteresis(choices.rank - 1)
         self._make_usual = make_driver
         self._matched = self._drives_matched = False
@@ -177,7 +173,7 @@ class PuppetMatch:
         if not isinstance(shown, MappedDriver):
             return False
         before = shown.mapping.drives
-        mapping = self._choose(self._hysteresis, positions, time, view)
+        mapping = self._mapping_choice.of_pose(self._hysteresis, positions, time, view)
         shown.show(mapping, view)
         return mapping.drives != before
 
@@ -229,13 +225,7 @@ class PuppetMatch:
         """
         self._clip, rest = clip, states[0]
         if isinstance(self._driver, MappedDriver):
-            choices = []
-            for state in states:  # each by itself: no state waits for the one before
-                hysteresis = MatchHysteresis(self._choices.rank - 1)
-                mapping = self._choose(hysteresis, state.positions, 0.0, view)
-                choices.append((mapping, state, hysteresis))
-            worths = [self._worth(mapping, state, view) for mapping, state, _ in choices]
-            mapping, rest, self._hysteresis = choices[int(np.argmax(worths))]
+            mapping, rest, self._hysteresis = self._mapping_choice.best_of(states, view)
             self._driver.show(mapping, view)
         self.perform(rest, view)
 
@@ -322,7 +312,9 @@ class PuppetMatch:
         if isinstance(driver, MappedDriver):
             mapping = self.mapping
             if self.rest is not None and not mapping.drives:
-                mapping = self._choose(self._hysteresis, self.rest.positions, 0.0, view)
+                mapping = self._mapping_choice.of_pose(
+                    self._hysteresis, self.rest.positions, 0.0, view
+                )
             driver.show(mapping, view)
         driver.prepare(self._clip, self.rest)
         if isinstance(driver, MappedDriver) and isinstance(before, MappedDriver):
@@ -349,49 +341,3 @@ class PuppetMatch:
                 "source gives joints only: choose a driver that follows a skeleton"
             )
         return driver
-
-    def _choose(
-        self, hysteresis: MatchHysteresis, positions: Array, time: float, view: Array
-    ) -> Mapping:
-        """The mapping for a pose (J, 3) [m]: by hand, or by the match that the hysteresis shows."""
-        if self._by_hand is not None:
-            return self._by_hand
-        ranked = self._hierarchy.rank(
-            self._source,
-            view,
-            positions[self._performer.joints],
-            limit=CANDIDATES + self._choices.rank,
-            size_preference=SIZE_PREFERENCE,
-        )
-        match = hysteresis.update(ranked, time)
-        if len(ranked) < self._choices.rank or match is None:
-            raise InputError(
-                f"{self.puppet.character.name} has {len(ranked)} matches with this part "
-                f"of the performer, so there is no --match {self._choices.rank}"
-            )
-        return self._mapping_of(match)
-
-    def _mapping_of(self, match: Match) -> Mapping:
-        """The mapping of a match: its chains without the parts inside the trunk."""
-        chosen = match if self._choices.extend else match.stopped()
-        joints, skeleton = self._performer.joints, self.puppet.bound_skeleton
-        drives = []
-        for pair, (nodes, matched) in enumerate(chosen.pairs):
-            source = tuple(joints[node] for node in nodes)
-            target = skeleton.limb(matched) if pair < match.limbs else matched
-            if len(target) < len(matched):
-                source = self._performer.limb(source)
-            if len(source) > 1 and len(target) > 1:
-                drives.append(Drive(source, target, self._choices.flip))
-        return Mapping(tuple(drives), match.score)
-
-    def _worth(self, mapping: Mapping, rest: Rest, view: Array) -> float:
-        """How well a rest state suits: the match's score plus the likeness of the limbs' shapes."""
-        nodes = self.puppet.bound_skeleton.tree.positions
-        shapes = sum(
-            shape_likeness(
-                rest.positions[list(drive.source)], nodes[list(drive.target)], STRAIGHT_ON, view
-            )
-            for drive in mapping.drives
-        )
-        return shapes + (mapping.score if np.isfinite(mapping.score) else 0.0)
