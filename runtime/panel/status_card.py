@@ -23,7 +23,8 @@ SIGHTS: dict[Sight, Colour] = {
     Sight.LOST: LACQUER,
     Sight.ENDED: GREY,
 }
-WIDTH = 470.0  # [px] in a picture of the usual height
+WIDTH = 700.0  # [px] in a picture of the usual height
+HEIGHT = 86.0  # [px] likewise, with one line of advice
 HEADLINE = 1.65  # times the height of usual letters
 ADVICE = 1.1
 COUNTDOWN = 9.0

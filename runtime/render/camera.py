@@ -14,6 +14,7 @@ DEFAULT_PITCH = math.radians(8.0)
 HIGHEST_PITCH = math.radians(80.0)
 HEADROOM = 0.42  # where boxes stand in spare height: 0 in the middle, 1 at the bottom
 NEAREST, FARTHEST = 0.3, 60.0  # [m] from the target that a zoom goes
+LEAST_FREE = 0.4  # how small strips make what they leave in view, at most
 LOWEST_PITCH = math.radians(1.0)  # the eye stays above the floor
 
 
@@ -26,6 +27,8 @@ class Camera:
         target: the point in the middle of the picture [m]; `orbit` turns about it.
         fov: vertical angle of view [rad].
         near, far: depth range [m].
+        shift: right and up, how far `target` is drawn from the middle of the picture, where 1 is
+            its edge.
     """
 
     eye: tuple[float, float, float] = (0.0, 1.5, 5.0)
@@ -33,6 +36,7 @@ class Camera:
     fov: float = math.radians(26.0)
     near: float = 0.1
     far: float = 100.0
+    shift: tuple[float, float] = (0.0, 0.0)
 
     @property
     def distance(self) -> float:
@@ -64,7 +68,46 @@ class Camera:
         matrix[1, 1] = scale
         matrix[2, 2:] = (self.far + self.near) / depth, 2.0 * self.far * self.near / depth
         matrix[3, 2] = -1.0
+        matrix[:2] += np.outer(self.shift, matrix[3])
         return matrix
+
+    def clear_of(
+        self,
+        left: float,
+        right: float,
+        top: float,
+        bottom: float,
+        *,
+        filled: tuple[float, float] = (1.0, 1.0),
+    ) -> Camera:
+        """Return a camera that draws what fills its picture clear of strips at the borders.
+
+        It draws everything smaller where it has to, and the same middle in the middle of what is
+        left; eye and target stay where they are.
+
+        Args:
+            left, right: width of the strips, as shares of the picture's.
+            top, bottom: height of the strips, likewise.
+            filled: share of width and height of this camera's picture that has to stay clear.
+        """
+        free = min(1.0, (1.0 - left - right) / filled[0], (1.0 - top - bottom) / filled[1])
+        fov = 2.0 * math.atan(math.tan(self.fov / 2.0) / max(free, LEAST_FREE))
+        return replace(self, fov=fov, shift=(left - right, bottom - top))
+
+    def fills(self, bounds: ArrayLike, aspect: float) -> NDArray[np.float64]:
+        """Return how far boxes reach from the middle to the edge of the picture, in x and y, (2,).
+
+        Args:
+            bounds: (2, 3) or (B, 2, 3) [m]; least and greatest corners of one or more boxes.
+            aspect: width over height of the picture.
+        """
+        corners = box_corners(np.asarray(bounds, dtype=np.float64).reshape(-1, 2, 3))
+        clip = (
+            np.pad(corners, ((0, 0), (0, 1)), constant_values=1.0)
+            @ (self.projection(aspect) @ self.view).T
+        )
+        reach: NDArray[np.float64] = np.abs(clip[:, :2] / clip[:, 3:]).max(axis=0)
+        return reach
 
     def frame(self, bounds: ArrayLike, aspect: float, *, margin: float = 0.1) -> Camera:
         """Return a camera with the same orientation in which boxes just fill the picture.

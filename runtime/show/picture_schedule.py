@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from runtime.output.output import Output, Screen
-from runtime.show.scene import Scene
+from runtime.show.scene import NOTHING_TAKEN, Scene
 
 EARLY = 0.75  # of the wanted step between pictures; frames never come quite evenly
 
@@ -55,12 +55,10 @@ class PictureSchedule:
         wanted = self.is_due(time)
         if self._scene is None or not (self._shown or wanted):
             return None
+        if wanted:
+            return self._read(self._scene, draw)
         draw()
-        if not wanted:
-            return None
-        picture = self._scene.picture()
-        self._taken_at = self._clock()
-        return picture
+        return None
 
     def is_due(self, time: float) -> bool:
         """Return whether outputs want a picture at `time` [s]; the next is due one step later."""
@@ -87,9 +85,20 @@ class PictureSchedule:
         due = bool(self._screens) and self._clock() - self._taken_at >= self._step
         if not (self._shown or due):
             return
+        if not due:
+            draw()
+            return
+        picture = self._read(self._scene, draw)
+        for screen in self._screens:
+            screen.show(picture)
+
+    def _read(self, scene: Scene, draw: Callable[[], None]) -> Picture:
+        """Draw what outputs see: no panel takes room from it. Then draw again for the window."""
+        taken, scene.taken = scene.taken, NOTHING_TAKEN
         draw()
-        if due:
-            picture = self._scene.picture()
-            self._taken_at = self._clock()
-            for screen in self._screens:
-                screen.show(picture)
+        picture = scene.picture()
+        self._taken_at = self._clock()
+        scene.taken = taken
+        if taken != NOTHING_TAKEN:
+            scene.redraw()
+        return picture

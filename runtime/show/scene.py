@@ -32,6 +32,8 @@ GAP = 0.18  # [m] of floor between two characters
 BLACKOUT = 0.3  # [s] to black, and back to light
 MARGIN = 0.06  # of the picture on each side that stays free
 LONG = 1.4  # times further back to frame the whole way: a longer way is followed
+CAPTION = 0.1  # of half the picture's height that captions take below what is framed
+NOTHING_TAKEN = (0.0, 0.0, 0.0, 0.0)
 ROOM = 0.12  # share of a character's size that stays in view around its rest pose
 
 
@@ -54,6 +56,8 @@ class Scene:
         highlights: whether the drivers' highlights are drawn.
         focus: the number of the puppet whose colours the inset's performer has.
         blackout: 0 for light, 1 for black.
+        taken: shares of the picture at its left, right, top and bottom that something lies over,
+            as a panel does in a window: all that is framed is drawn clear of them.
     """
 
     def __init__(
@@ -85,6 +89,8 @@ class Scene:
         self.highlights = not plain
         self.focus = 0
         self.camera = front_camera()
+        self.taken = NOTHING_TAKEN
+        self._pose: Pose | None = None
         self._close_up: Camera | None = None
         self._rest = self.stage.boxes
         self._reaches: Sequence[Reach] | None = None
@@ -122,6 +128,9 @@ class Scene:
         homes = np.array([character.pool[:2] - character.spot for character in self._characters])
         self._marks = homes[:, None] + ways
         self._boxes, self.camera = boxes, camera
+        below = CAPTION if self._captions else 0.0
+        across, high = camera.fills(boxes, self.stage.aspect) + (2.0 * MARGIN, 2.0 * MARGIN + below)
+        self._filled = min(across, 1.0), min(high, 1.0)
 
     def view_from_front(self) -> None:
         """Look from the front again, with every character in view."""
@@ -161,8 +170,13 @@ class Scene:
         for character, motion in zip(self._characters, motions, strict=True):
             character.update(motion.vertices)
 
+    def redraw(self) -> None:
+        """Draw once more what was drawn last."""
+        self.draw(self._pose)
+
     def draw(self, pose: Pose | None) -> None:
         """Draw the uploaded puppets with their highlights, and the performer in the inset."""
+        self._pose = pose
         highlights = [puppet.highlights for puppet in self._puppets]
         for character, own in zip(self._characters, highlights, strict=True):
             lit = own if self.highlights else []
@@ -179,7 +193,10 @@ class Scene:
         for character, spot in zip(self._characters, self._glide.places, strict=True):
             character.spot = spot
         inset = self._inset if pose is not None else None
-        self.stage.draw(self._gliding_camera(), inset, self._stage_set())
+        camera = self._gliding_camera()
+        if self.taken != NOTHING_TAKEN:
+            camera = camera.clear_of(*self.taken, filled=self._filled)
+        self.stage.draw(camera, inset, self._stage_set())
 
     @property
     def inset_side(self) -> float:

@@ -16,6 +16,7 @@ from runtime.control.actions import ACTIONS
 from runtime.control.show_controls import ShowControls
 from runtime.driving.driver import RELATIVE, DrivenPart
 from runtime.panel.panel import Panel
+from runtime.show.scene import NOTHING_TAKEN
 from runtime.status.show_status import ShowStatus
 from tests.runtime.staged import StagedShow
 from tests.runtime.stick_figures import make_figure, record, waving
@@ -113,6 +114,25 @@ def test_a_hidden_panel_draws_nothing(screen: Screen, show: StagedShow) -> None:
     screen.now += 60.0  # after all that has just happened
     show.now += 60.0
     assert not covered(screen.draw()).any()
+
+
+def test_the_stage_makes_room_for_the_panel_while_it_is_shown(
+    screen: Screen, show: StagedShow
+) -> None:
+    assert show.scene is not None
+    screen.draw(5)
+    left, right, top, bottom = show.scene.taken
+    assert min(left, top, bottom) > 0.05
+    assert right == 0.0
+    over = covered(screen.draw())
+    stage = over[round(720 * top) : round(720 * (1.0 - bottom)), round(1280 * left) :]
+    assert not stage.any(), "nothing lies on what is framed"
+    show.controls.view.sliders = True
+    screen.draw(5)
+    assert show.scene.taken[1] > 0.1
+    show.controls.view.panel = False
+    screen.draw(5)
+    assert show.scene.taken == NOTHING_TAKEN
 
 
 def test_the_list_of_keys_fits_the_picture(screen: Screen, show: StagedShow) -> None:

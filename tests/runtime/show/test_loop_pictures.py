@@ -10,7 +10,7 @@ import pytest
 
 from replay.player import EveryFrame, Player, RealTime
 from runtime.puppet.puppet import Puppet
-from runtime.show.scene import Scene
+from runtime.show.scene import NOTHING_TAKEN, Scene
 from tests.runtime.show.loops import Kept, Tape, Wire, loop_of, play
 from tests.runtime.stick_figures import (
     BODY,
@@ -80,6 +80,25 @@ def test_who_looks_sees_every_tick(puppet: Puppet, context: moderngl.Context) ->
     assert not loop.tick()
     assert np.abs(scene.picture().astype(int) - before).max() > 40
     scene.close()
+
+
+def test_outputs_see_all_of_the_picture_whatever_a_panel_takes(
+    puppet: Puppet, context: moderngl.Context
+) -> None:
+    kept: list[Kept] = []
+    for taken in (NOTHING_TAKEN, (0.3, 0.0, 0.2, 0.1)):
+        puppet.rest()
+        puppet.surface.reset()
+        scene = Scene(context, SIZE, [puppet], BODY)
+        scene.taken = taken
+        kept.append(Kept(math.inf))
+        player = Player(record(waving(3)), EveryFrame())
+        play(loop_of(player, [puppet], [kept[-1:]], scene=scene, shown=True), player)
+        seen, whole = scene.picture(), kept[-1].frames[-1].picture
+        assert (seen != whole).any() == (taken != NOTHING_TAKEN), "the window shows it clear"
+        scene.close()
+    for alone, beside in zip(*(each.frames for each in kept), strict=True):
+        np.testing.assert_array_equal(alone.picture, beside.picture)
 
 
 class Shown(Kept):

@@ -17,7 +17,7 @@ from runtime.driving.performer import Performer, Pose, rest_state
 from runtime.driving.reach import Reach
 from runtime.puppet.puppet import Motion, Puppet
 from runtime.render.background import NOTHING
-from runtime.show.scene import BLACKOUT, GAP, Scene
+from runtime.show.scene import BLACKOUT, GAP, NOTHING_TAKEN, Scene
 from tests.runtime.show.framing import FULL, SIZE, WIDE, reach
 from tests.runtime.stick_figures import (
     ARMS,
@@ -267,3 +267,29 @@ def test_any_performer_fits_into_the_mirror(
     scenes.append(Scene(context, SIZE, one, lone))
     moment = Performer(lone).follow(frame(np.array([[0.0, 1.0, 0.0]])))
     assert picture(scenes[0], one, moment).shape == (54, 96, 4)
+
+
+@pytest.mark.parametrize("taken", [(0.3, 0.0, 0.2, 0.1), (0.2, 0.25, 0.0, 0.3)])
+def test_what_is_framed_is_drawn_clear_of_a_panel(
+    context: moderngl.Context,
+    puppets: list[Puppet],
+    scenes: list[Scene],
+    taken: tuple[float, float, float, float],
+) -> None:
+    scenes.append(Scene(context, (320, 180), puppets, BODY, background=NOTHING))
+    scene = scenes[0]
+    motions = rested(puppets)
+    scene.show(None, motions)
+    whole = scene.picture()
+    scene.taken = taken
+    scene.redraw()
+    rows, columns = np.nonzero(scene.picture()[..., 3])
+    left, right, top, bottom = taken
+    assert columns.min() >= 320 * left
+    assert columns.max() < 320 * (1.0 - right)
+    assert rows.min() >= 180 * top
+    assert rows.max() < 180 * (1.0 - bottom)
+    assert np.ptp(columns) > 0.5 * 320 * (1.0 - left - right), "as large as there is room"
+    scene.taken = NOTHING_TAKEN
+    scene.redraw()
+    np.testing.assert_array_equal(scene.picture(), whole)
