@@ -90,7 +90,7 @@ class _Reader:
                 self.notes.append("further subjects are left out")
         if self._subjects > 1:
             return
-        if name == "segment" and len(self.labels) < _MOST_SEGMENTS:
+        if name == "segment" and not self.positions and len(self.labels) < _MOST_SEGMENTS:
             self.labels.append(attributes.get("label", "")[:64])
         elif name == "frame":
             self._kind = attributes.get("type", "normal")

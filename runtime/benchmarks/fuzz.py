@@ -41,11 +41,11 @@ def run(
     Raises:
         InputError: there were faults; the message names the folder with the inputs.
     """
-    watch = Watch()
     counts: dict[str, int] = {}
     faults: list[str] = []
     began = process_time()
     with tempfile.TemporaryDirectory() as folder:
+        watch = Watch(Path(folder) / "unpacked")
         every = subjects(Path(folder), recording, [Path(name) for name in character])
         with watch.quiet():
             for subject in every:

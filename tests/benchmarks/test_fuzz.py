@@ -119,6 +119,22 @@ def test_an_input_that_hangs_is_stopped(monkeypatch: pytest.MonkeyPatch) -> None
     assert fault == "took longer than 0.05 s"
 
 
+def test_readers_write_in_their_scratch_folder_alone(tmp_path: Path) -> None:
+    (tmp_path / "own").mkdir()
+    watch = Watch(tmp_path / "own")
+    with watch.quiet():
+        own = watch.fault(lambda: _write(tmp_path / "own" / "new" / "a"))
+        other = watch.fault(lambda: _write(tmp_path / "own" / ".." / "b" / "a"))
+    assert own == ""
+    assert "os.mkdir" in other
+    assert "for writing" in other
+
+
+def _write(path: Path) -> None:
+    path.parent.mkdir()
+    path.write_text("a", encoding="ascii")
+
+
 def test_damage_depends_on_the_seed_alone() -> None:
     import random
 

@@ -26,7 +26,7 @@ from devices.leap.websocket_messages import LeapDecoder
 from devices.mediapipe.landmark_messages import LandmarkDecoder
 from devices.skeleton import SkeletonFrame
 from devices.transport.senders import Decoder
-from tests.devices.kinect.packets import azure_packet, v1_packet, v2_packet
+from runtime.benchmarks.fuzzing.kinect_packets import azure_packet, v1_packet, v2_packet
 from tests.devices.leap.leap_messages import HEADER, both, device_event
 from tests.devices.mediapipe.test_landmark_stream import SIZE, person, rows, seen_at
 from tests.devices.mediapipe.test_landmark_stream import message as landmarks

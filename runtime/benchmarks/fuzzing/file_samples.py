@@ -17,6 +17,7 @@ from replay.joint_table import write_joint_table
 from replay.mcap.writer import McapWriter
 from replay.recording import Recording
 from replay.studio.smpl import ORDER
+from runtime.benchmarks.fuzzing.mcap_samples import plain_mcap
 
 MAPPING = json.dumps(
     {"pairs": [{"source": ["SpineBase", "SpineMid", "Head"], "target": [0, 1, 2], "flip": False}]}
@@ -172,6 +173,7 @@ def recording_samples(folder: Path) -> Iterator[tuple[str, bytes]]:
             writer.write(SkeletonFrame(number / 30, pose, None, np.ones(2), arrival=number / 30))
     yield "mcap.mcap", made.read_bytes()
     made.unlink()
+    yield "plain.mcap", plain_mcap(skeleton, places)
     table = io.StringIO()
     times = np.arange(3) / 30
     one, seen = np.zeros(3, np.int64), np.ones((3, 2))

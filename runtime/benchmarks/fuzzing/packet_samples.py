@@ -23,7 +23,9 @@ from devices.skeleton import Skeleton, SkeletonFrame
 from devices.suits.rokoko_bones import SKELETON as ROKOKO
 from devices.suits.xsens_segments import xsens_skeleton
 from runtime.benchmarks.fuzzing.file_samples import leap_message, person
+from runtime.benchmarks.fuzzing.kinect_packets import azure_packet, v1_packet, v2_packet
 
+_AHEAD, _FLOOR = (0.1, 0.2, 2.0), (0.0, 1.0, 0.0, 0.9)
 _PLACE = (0.1, 1.0, 0.2, 0.0, 0.0, 0.0, 1.0)
 
 
@@ -38,6 +40,9 @@ def packet_samples() -> dict[str, list[bytes]]:
         "rokoko": _rokoko(),
         "xsens": _xsens(),
         "bridge": _bridge(),
+        "Kinect v1": [v1_packet({1: (2, 7, _AHEAD), 3: (1, 8, _AHEAD)}, _FLOOR)],
+        "Kinect v2": [v2_packet({0: (7, _AHEAD), 2: (8, _AHEAD)}, _FLOOR)],
+        "Azure Kinect": [azure_packet({1: (0.1, 0.2, 2000.0), 2: (500, 0, 2500)}, (0, -1, 0))],
     }
 
 

@@ -11,6 +11,8 @@ import numpy as np
 
 from devices.bridge.messages import decode
 from devices.errors import InputError
+from devices.kinect import azure, v1, v2
+from devices.kinect.bodies import KinectDecoder
 from devices.leap.websocket_messages import LeapDecoder
 from devices.mediapipe.landmark_messages import LandmarkDecoder
 from devices.osc.nimate import NimateDecoder
@@ -31,6 +33,7 @@ from runtime.benchmarks.fuzzing.file_samples import (
     recording_samples,
 )
 from runtime.benchmarks.fuzzing.packet_samples import packet_samples
+from runtime.benchmarks.fuzzing.session_samples import session_samples
 from runtime.characters.builtin import builtin_character
 from runtime.characters.formats.mesh_file import MESH_SUFFIXES, read_mesh_file
 from runtime.characters.gltf.rig import read_gltf
@@ -79,6 +82,7 @@ def subjects(folder: Path, recordings: Sequence[Path], characters: Sequence[Path
     return [
         *(_of_file(folder / name, data, _recording) for name, data in motions),
         *_acclaim(folder),
+        *(_of_file(folder / name, data, read) for name, data, read in session_samples(folder)),
         *(_of_file(folder / name, data, _character) for name, data in shapes),
         _of_file(folder / "mapping.json", MAPPING, _mapping),
         *(_picture(folder / f"textures-{kind}", data) for kind, data in pictures().items()),
@@ -159,6 +163,9 @@ DECODERS: dict[str, Callable[[], Feeding]] = {
     "rokoko": RokokoDecoder,
     "xsens": XsensDecoder,
     "bridge": _Bridge,
+    "Kinect v1": lambda: KinectDecoder(v1.SENSOR),
+    "Kinect v2": lambda: KinectDecoder(v2.SENSOR),
+    "Azure Kinect": lambda: KinectDecoder(azure.SENSOR),
 }
 """The decoder of each protocol."""
 

@@ -10,6 +10,7 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from types import FrameType
 from typing import Any
 
@@ -41,9 +42,13 @@ class Watch:
     """Runs the readers and decoders on one input after another, and says what none may do.
 
     An audit hook stays in the interpreter for good; it is idle between inputs.
+
+    Args:
+        scratch: a folder in which readers may write; None for nowhere.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, scratch: Path | None = None) -> None:
+        self._scratch = None if scratch is None else f"{scratch}{os.sep}"
         self._watching = False
         self._seen: list[str] = []
         sys.addaudithook(self._audit)
@@ -110,10 +115,16 @@ class Watch:
         if event == "open":
             _, mode, flags = arguments
             writes = set("wax+") & set(mode) if isinstance(mode, str) else flags & _WRITING
-            if writes:
+            if writes and not self._is_scratch(arguments[0]):
                 self._seen.append(f"opened {arguments[0]!r} for writing")
+        elif event.startswith(_CHANGES) and self._is_scratch(arguments[0]):
+            return
         elif event.startswith((*_STARTS, *_CHANGES, *_CALLS)):
             self._seen.append(f"{event} {arguments!r:.200}")
+
+    def _is_scratch(self, path: object) -> bool:
+        inside = self._scratch
+        return inside is not None and f"{os.path.abspath(str(path))}{os.sep}".startswith(inside)  # noqa: PTH100
 
 
 def _too_long(number: int, frame: FrameType | None) -> None:

@@ -18,7 +18,7 @@ from devices.kinect import v2 as kinect_v2
 from devices.kinect.bodies import KinectDecoder, Sensor
 from devices.kinect.joints import KINECT_AZURE, KINECT_V1, KINECT_V2
 from devices.leap import sdk as leap_sdk
-from tests.devices.kinect.packets import azure_packet, v1_packet, v2_packet
+from runtime.benchmarks.fuzzing.kinect_packets import azure_packet, v1_packet, v2_packet
 
 SENSORS = (kinect_v1.SENSOR, kinect_v2.SENSOR, kinect_azure.SENSOR)
 

@@ -24,6 +24,7 @@ def v1_packet(people: dict[int, tuple[int, int, Sequence[float]]], floor: Sequen
 
 
 def v2_packet(people: dict[int, tuple[int, Sequence[float]]], floor: Sequence[float]) -> bytes:
+    """A frame with people in slots: id, and the place of every joint."""
     data = struct.pack("<q4f", 15_000_000, *floor)
     for slot in range(6):
         body, place = people.get(slot, (0, (0.0, 0.0, 0.0)))
@@ -37,6 +38,7 @@ def v2_packet(people: dict[int, tuple[int, Sequence[float]]], floor: Sequence[fl
 
 
 def azure_packet(people: dict[int, Sequence[float]], up: Sequence[float]) -> bytes:
+    """A frame with people by id: the place of every joint."""
     data = struct.pack("<QI3f", 1_500_000, len(people), *up)
     for body, place in people.items():
         data += struct.pack("<I", body)
