@@ -68,6 +68,11 @@ class RecordingFormat:
         """
         if not path.is_dir():
             check_recordable(path)
+        if stated.animation is not None and self.reader is not read_gltf_animation:
+            raise InputError(
+                f"{path}: --animation-input chooses among the animations of a glTF file, and this "
+                "is none; leave it out"
+            )
         try:
             recording = self.reader(path, stated)
         except ContentError as error:

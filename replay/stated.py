@@ -32,6 +32,7 @@ class Stated:
         up: of `AXES`, the file's axis that points up.
         unit: of `METRES`, the file's unit of length.
         mirrored: the file shows the performer as in a mirror.
+        animation: which of the file's animations is meant: its name, or its number from 1.
 
     Raises:
         InputError: there is no such unit or axis.
@@ -41,6 +42,7 @@ class Stated:
     up: str | None = None
     unit: str | None = None
     mirrored: bool = False
+    animation: str | None = None
 
     def __post_init__(self) -> None:
         if self.unit is not None and self.unit not in METRES:

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.errors import ContentError
+from devices.printable import printable
 from replay.bounds import MOST_POSES
 from replay.gltf.checked_json import Entry
 from replay.gltf.file import GltfFile
@@ -21,6 +22,8 @@ PATHS = {"translation": 3, "rotation": 4, "scale": 3}
 """What of a node is animated, and its numbers; weights of morph targets are no motion of joints."""
 
 MOST_CHANNELS = 100_000
+_MOST_NAMED = 24  # animations in a line
+_MOST_LETTERS = 60
 _LATEST = 1e6  # [s] of a key
 _USUAL_RATE = 60.0
 _SAME = 1e-5  # [s] between keys of one frame
@@ -101,6 +104,12 @@ class Animation:
         """The nodes that are animated."""
         return {node for node, _ in self.tracks}
 
+    @property
+    def seconds(self) -> float:
+        """From the first key to the last [s]."""
+        ends = [(track.times[0], track.times[-1]) for track in self.tracks.values()]
+        return float(max(end for _, end in ends) - min(start for start, _ in ends))
+
     def times(self) -> Array:
         """The times (T,) [s] at which it is sampled: its own even keys, or 60 a second.
 
@@ -165,15 +174,37 @@ def _track(file: GltfFile, sampler: Entry, width: int) -> Track:
     return Track(times, values.reshape(len(times), 3, width) if triple == 3 else values, way)
 
 
-def first_moving(found: list[Animation]) -> Animation:
-    """Return the first of the animations that have more than one key, or the first of all.
+def chosen(found: list[Animation], wanted: str | None) -> Animation:
+    """Return the animation of a name or a number from 1; the first that moves where None is given.
+
+    An animation moves if it has more than one key.
 
     Raises:
-        ContentError: there is none.
+        ContentError: there is none, or none that is wanted; the message lists them.
     """
     if not found:
         raise ContentError("it holds no animation of nodes; name it as a character")
-    return next((one for one in found if len(one.times()) > 1), found[0])
+    if wanted is None:
+        return next((one for one in found if len(one.times()) > 1), found[0])
+    for one in found:
+        if one.name == wanted:
+            return one
+    if wanted.isdecimal() and 0 < int(wanted[:9]) <= len(found):
+        return found[int(wanted) - 1]
+    alike = [one for one in found if one.name.strip().lower() == wanted.strip().lower()]
+    if len(alike) != 1:
+        raise ContentError(f"it has no animation {wanted!r:.60}; it has {listed(found)}")
+    return alike[0]
+
+
+def listed(found: list[Animation], leave_out: Animation | None = None) -> str:
+    """The animations of a file in a line: "1 'walk' (2.0 s), 2 'run' (1.5 s)"."""
+    each = [
+        f"{number} {printable(one.name, _MOST_LETTERS)!r} ({one.seconds:.1f} s)"
+        for number, one in enumerate(found, 1)
+        if one is not leave_out
+    ]
+    return ", ".join(each[:_MOST_NAMED]) + (", ..." if len(each) > _MOST_NAMED else "")
 
 
 def check_size(frames: float, nodes: int) -> None:

@@ -14,8 +14,9 @@ from scipy.spatial.transform import Rotation
 
 from devices.blend_shapes import MOST_BLENDS, Blends, checked_blends
 from devices.bodies.joint_labels import label_joints
+from devices.printable import printable
 from devices.skeleton import Skeleton
-from replay.gltf.animation import PATHS, Animation, animations, check_size, first_moving
+from replay.gltf.animation import PATHS, Animation, animations, check_size, chosen, listed
 from replay.gltf.file import MOST_BYTES, GltfFile
 from replay.gltf.humanoid import humanoid_bones
 from replay.gltf.scene import Scene, local_transform, read_scene
@@ -35,7 +36,6 @@ _SIZES = (0.05, 12.0)  # [m] of one that has no height
 _ALIKE = 1e-3  # of a scale: less is no shear
 _MOVE = "translation"
 _Y = np.array([0.0, 1.0, 0.0])
-_MOST_NAMED = 6  # other animations in the note
 
 
 def recognises_gltf(path: Path, head: bytes) -> bool:
@@ -48,7 +48,7 @@ def recognises_gltf(path: Path, head: bytes) -> bool:
 
 
 def read_gltf_animation(path: Path, stated: Stated = UNSTATED) -> Recording:
-    """Read the first animation of a file that has motion: its skins' joints, or its moved nodes.
+    """Read an animation of a file, the first that moves: its skins' joints, or its moved nodes.
 
     A VRM animation has the bones of its humanoid, by VRM's names. Joints are sampled at the file's
     own even keys, else 60 times a second; rotations are joint to world. +Y is up and the metre the
@@ -56,25 +56,18 @@ def read_gltf_animation(path: Path, stated: Stated = UNSTATED) -> Recording:
 
     Raises:
         InputError: it cannot be read.
-        ContentError: it is damaged or compressed, or holds no motion.
+        ContentError: it is damaged or compressed, or holds no motion, or not what is stated.
     """
     file = GltfFile(file_bytes(path, MOST_BYTES), path.parent)
     scene = read_scene(file)
     found = animations(file)
-    chosen = first_moving(found)
+    played = chosen(found, stated.animation)
     notes: list[str] = []
-    if len(found) > 1:
-        others = [one.name for one in found if one is not chosen]
-        more = ", ..." if len(others) > _MOST_NAMED else ""
-        notes.append(
-            f"animation {chosen.name!r}; the file's others are left out: "
-            f"{', '.join(map(repr, others[:_MOST_NAMED]))}{more}"
-        )
-    names = _joint_names(file, scene, chosen)
-    times = chosen.times()
+    names = _joint_names(file, scene, played)
+    times = played.times()
     nodes = _with_ancestors(scene, list(names))
     check_size(len(times), len(nodes))
-    positions, rotations = _posed(file, scene, nodes, chosen, times)
+    positions, rotations = _posed(file, scene, nodes, played, times)
     joints = list(names)
     at = np.array([nodes.index(node) for node in joints])
     motion = JointMotion(
@@ -87,7 +80,21 @@ def read_gltf_animation(path: Path, stated: Stated = UNSTATED) -> Recording:
         up=_Y,
     )
     recording = staged(replace(motion, metres=_metres(motion)), stated, notes)
-    return _with_faces(recording, file, chosen, times)
+    if len(found) > 1:
+        others = listed(found, leave_out=played)
+        said = f"{found.index(played) + 1} {printable(played.name)!r:.60}; by --animation-input: "
+        recording = replace(recording, source={"animation": said + others})
+    return _with_faces(recording, file, played, times)
+
+
+def animations_in(path: Path) -> str:
+    """The animations of a file in a line; "" for none.
+
+    Raises:
+        InputError: it cannot be read.
+        ContentError: it is damaged.
+    """
+    return listed(animations(GltfFile(file_bytes(path, MOST_BYTES), path.parent)))
 
 
 def _joint_names(file: GltfFile, scene: Scene, animation: Animation) -> dict[int, str]:

@@ -57,6 +57,21 @@ def _of_character(name: str) -> list[str]:
         f"nodes       {len(parents)}, {len(leaves)} of them leaves",
         f"rig         {'from the file' if character.weights is not None else 'none in the file'}",
         f"on stage    {width:.2f} x {height:.2f} x {depth:.2f} m",
+        f"animations  {_animations(Path(name)) or 'none'}",
         f"blends      {printable(', '.join(blends)) or 'none'}",
         *(f"note        {printable(note)}" for note in character.notes),
     ]
+
+
+def _animations(path: Path) -> str:
+    """What a file could play as a recording; "" for nothing."""
+    from devices.errors import ContentError
+    from replay.gltf.reader import animations_in
+    from runtime.characters.character_file import RIG_SUFFIXES
+
+    if path.suffix.lower() not in RIG_SUFFIXES:
+        return ""
+    try:
+        return animations_in(path)
+    except ContentError as error:
+        return f"damaged: {error}"

@@ -21,19 +21,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Perform the recording to its end."""
+    from devices.printable import printable
+    from devices.stream import SkeletonStream
+    from replay.formats import read_recording
     from runtime.cli.performing import perform
-    from runtime.show.open_stream import open_stream
+    from runtime.show.open_stream import play
 
     path: Path = options.recording
+
+    def opened() -> SkeletonStream:
+        recording = read_recording(path, stated(options))
+        if "animation" in recording.source:
+            print(f"animation {printable(recording.source['animation'])}")
+        return play(recording, every_frame=options.fast, speed=options.speed, loop=options.loop)
+
     return perform(
         options,
-        lambda: open_stream(
-            path,
-            every_frame=options.fast,
-            speed=options.speed,
-            loop=options.loop,
-            stated=stated(options),
-        ),
+        opened,
         origin=path.name,
         read=[("RECORDING", path)],
     )

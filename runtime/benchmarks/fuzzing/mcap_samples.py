@@ -61,5 +61,5 @@ def _without_checks(packed: bytes) -> bytes:
             channels[channel.id], message.log_time, message.data, message.publish_time,
             message.sequence,
         )  # fmt: skip
-    writer.finish()  # type: ignore[no-untyped-call]
+    writer.finish()  # type: ignore[no-untyped-call]  # it has no types
     return plain.getvalue()

@@ -124,7 +124,7 @@ class Watch:
 
     def _is_scratch(self, path: object) -> bool:
         inside = self._scratch
-        return inside is not None and f"{os.path.abspath(str(path))}{os.sep}".startswith(inside)  # noqa: PTH100
+        return inside is not None and f"{os.path.abspath(str(path))}{os.sep}".startswith(inside)  # noqa: PTH100  # follows no links
 
 
 def _too_long(number: int, frame: FrameType | None) -> None:

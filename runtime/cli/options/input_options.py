@@ -35,6 +35,11 @@ def add_input_options(parser: argparse.ArgumentParser) -> None:
     said.add_argument(
         "--mirror-input", action="store_true", help="it shows the performer as in a mirror"
     )
+    said.add_argument(
+        "--animation-input",
+        metavar="NAME",
+        help="which animation of a glTF file is played: its name, or its number from 1",
+    )
 
 
 def stated(options: argparse.Namespace) -> Stated:
@@ -46,6 +51,7 @@ def stated(options: argparse.Namespace) -> Stated:
         up=options.up_input,
         unit=options.unit_input,
         mirrored=options.mirror_input,
+        animation=options.animation_input,
     )
 
 

@@ -14,6 +14,7 @@ from devices.bodies.joint_labels import label_joints
 from devices.bodies.joint_names import Kind
 from devices.errors import InputError
 from replay.formats import read_recording, recognise
+from replay.gltf.reader import animations_in
 from replay.recording import Recording
 from replay.stated import Stated
 
@@ -181,7 +182,52 @@ def test_the_first_animation_that_moves_is_taken(tmp_path: Path) -> None:
     clip.document["animations"] = [still, first]
     recording = read_recording(clip.save(tmp_path))
     assert len(recording) == 61
-    assert any("'walk'" in note and "'rest'" in note for note in recording.notes)
+    said = "2 'walk'; by --animation-input: 1 'rest' (0.0 s)"
+    assert recording.source == {"animation": said}
+    assert animations_in(tmp_path / "walk.gltf") == "1 'rest' (0.0 s), 2 'walk' (1.0 s)"
+
+
+def several(folder: Path) -> Path:
+    clip = Clip()
+    clip.move(0, "translation", [0.0, 1.0], [[0, 1, 0], [0, 1, 2]])
+    for name, far in (("Run", 5.0), ("1", 7.0), ("", 9.0)):
+        output = clip.accessor([[0, 1, 0], [0, 1, far]])
+        clip.document["animations"].append(
+            {
+                "name": name,
+                "samplers": [{"input": clip.accessor([0.0, 1.0]), "output": output}],
+                "channels": [{"sampler": 0, "target": {"node": 0, "path": "translation"}}],
+            }
+        )
+    return clip.save(folder)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "far"),
+    [(None, 2.0), ("walk", 2.0), ("Run", 5.0), ("run", 5.0), ("2", 5.0), ("1", 7.0), ("4", 9.0)],
+)
+def test_an_animation_is_chosen_by_its_name_or_number(
+    wanted: str | None, far: float, tmp_path: Path
+) -> None:
+    recording = read_recording(several(tmp_path), Stated(animation=wanted))
+    assert at(recording, "hip")[60, 2] == pytest.approx(far)
+
+
+@pytest.mark.parametrize("wanted", ["jump", "5", "0", "", "9" * 5000, "a\nb"])
+def test_an_unknown_animation_is_answered_with_the_known_ones(wanted: str, tmp_path: Path) -> None:
+    path = several(tmp_path)
+    if wanted == "":
+        assert len(read_recording(path, Stated(animation=wanted))) == 61  # the one without a name
+        return
+    with pytest.raises(InputError, match="it has 1 'walk'") as refused:
+        read_recording(path, Stated(animation=wanted))
+    assert "\n" not in str(refused.value)
+
+
+def test_other_formats_have_no_animations_to_choose(tmp_path: Path) -> None:
+    (tmp_path / "a.bvh").write_text("HIERARCHY")
+    with pytest.raises(InputError, match="leave it out"):
+        read_recording(tmp_path / "a.bvh", Stated(animation="walk"))
 
 
 def test_lost_numbers_are_gaps(tmp_path: Path) -> None:
