@@ -15,7 +15,7 @@ def draw_bar(status: ShowStatus, controls: ShowControls, margin: float, scale: f
     """Draw the bar; return how high it is with its margin [px]."""
     screen = imgui.get_io().display_size
     with card("bar", margin, -margin, screen.x - 2.0 * margin):
-        if status.playback is not None:
+        if status.playback is not None and status.session is None:
             _draw_playback(status.playback, controls, scale)
             imgui.same_line()
         button("record", controls, icon=icons.ICON_FA_CIRCLE)

@@ -20,6 +20,7 @@ from runtime.panel.sliders import WIDTH as SLIDERS
 from runtime.panel.sliders import draw_sliders
 from runtime.panel.status_card import HEIGHT as STATUS_HEIGHT
 from runtime.panel.status_card import draw_countdown, draw_notices, draw_status
+from runtime.panel.timeline import Timeline
 from runtime.status.show_status import ShowStatus
 
 if TYPE_CHECKING:
@@ -55,6 +56,7 @@ class Panel:
         self._controls, self._status = controls, status
         self._clock = clock
         self._drawn = clock()
+        self._timeline = Timeline()
         self._shown: ShowStatus | None = None
         self._read = -math.inf
         self._above = 0.0
@@ -83,7 +85,10 @@ class Panel:
         if controls.view.panel:
             inset = 0.0 if controls.scene is None else controls.scene.inset_side
             draw_status(status, inset + margin, scale, margin)
-            above = self._above = draw_bar(status, controls, margin, scale)
+            above = draw_bar(status, controls, margin, scale)
+            if controls.session is not None:
+                above += self._timeline.draw(controls, margin, above - margin, scale)
+            self._above = above
             draw_legend(status, controls, margin, scale, inset, above)
             if controls.view.sliders:
                 draw_sliders(controls, margin, scale)

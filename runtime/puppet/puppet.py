@@ -44,6 +44,11 @@ class Motion:
 class Layers(Protocol):
     """Motion that is put on what a driver says."""
 
+    @property
+    def shows_driver(self) -> bool:
+        """Whether the character moves as its driver says, so that highlights lie on it."""
+        ...
+
     def over(self, targets: Targets, time: float) -> Targets:
         """Return the targets with that motion, for a frame at `time` [s]."""
         ...
@@ -206,6 +211,8 @@ class Puppet:
     def highlights(self) -> list[Highlight]:
         """The highlights of the driver that is proposed, or else of the one that moves it."""
         place, nodes = self._stance.place, self._targets.nodes
+        if self.layers is not None and not self.layers.shows_driver:
+            return []
         driver = self.driver if self.proposal is None else self.proposal
         if isinstance(self.proposal, MappedDriver) and nodes is not None:
             return [  # on the character as it is now, which another driver moves

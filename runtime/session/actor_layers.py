@@ -67,6 +67,11 @@ class ActorLayers:
         self._recorder: PerformanceRecorder | None = None
         self._buffer = self._fresh()
 
+    @property
+    def shows_driver(self) -> bool:
+        """Whether the performer alone moves the nodes that the driver names."""
+        return self._weight == 1.0
+
     def start(self) -> None:
         """Record from the next frame on."""
         self._recorder = self._fresh()

@@ -136,6 +136,13 @@ def raised(session: Session, number: int, layers: int) -> Session:
     return replace(session, clips=(*others[:place], clip, *others[place:]))
 
 
+def replaced(session: Session, clip: Clip) -> Session:
+    """Put a clip in the place of the one with its id."""
+    session.clip(clip.id)
+    clips = tuple(clip if one.id == clip.id else one for one in session.clips)
+    return replace(session, clips=clips)
+
+
 def without_clip(session: Session, number: int) -> Session:
     """Take a clip away; its take stays."""
     clip = session.clip(number)

@@ -108,6 +108,10 @@ class LiveSession:
         self._tell(f"done again: {done}" if self.store.versions.redo() else "nothing to do again")
         self._write()
 
+    def say(self, line: str) -> None:
+        """Say one line to the puppeteer."""
+        self._tell(line)
+
     def save(self) -> None:
         """Write the session as one file."""
         try:

@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import math
 
+from runtime.session.transport import Mode
+from runtime.status.session_words import session_advice, session_headline
 from runtime.status.show_status import CharacterStatus, ShowStatus
 from runtime.status.stream_watch import Sight, Sighting
 
 
 def headline(status: ShowStatus) -> str:
     """What is seen of the performer, to be read from two metres away."""
-    if status.playback is not None and status.playback.paused:
+    if status.session is not None and (words := session_headline(status.session)):
+        return words
+    if _is_paused(status):
         return "Paused"
     if status.frozen:
         return "Frozen"
@@ -25,7 +29,9 @@ def headline(status: ShowStatus) -> str:
 
 def advice(status: ShowStatus) -> str:
     """What to do next, in one or two sentences."""
-    if status.playback is not None and status.playback.paused:
+    if status.session is not None and status.session.mode is not Mode.REHEARSING:
+        return session_advice(status.session)
+    if _is_paused(status):
         return "Space plays on. Drag the line below to go to another moment."
     if status.frozen:
         return "The characters stand still. Press e to let them move again."
@@ -64,8 +70,15 @@ def countdown(status: ShowStatus) -> float | None:
     return min(left, default=None)
 
 
+def _is_paused(status: ShowStatus) -> bool:
+    """Whether a recording stands still; the time of a session does so while one rehearses."""
+    return status.session is None and status.playback is not None and status.playback.paused
+
+
 def _advice_on_matching(status: ShowStatus) -> str:
     matching = [character for character in status.characters if character.matching]
+    if not matching and status.session is not None:
+        return session_advice(status.session)
     if not matching:
         return "Perform! Press m to match again, r to record a take, ? for all keys."
     if all(character.countdown is None for character in matching):

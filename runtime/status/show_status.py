@@ -8,9 +8,11 @@ from dataclasses import dataclass
 from replay.playback import Playback
 from runtime.driving.choices import Candidate
 from runtime.driving.driver import DrivenPart
+from runtime.session.live_session import LiveSession
 from runtime.show.act_group import Act
 from runtime.show.loop import FrameLoop
 from runtime.show.takes import RunningTake, Takes
+from runtime.status.session_words import SessionStatus, session_status
 from runtime.status.stream_watch import Sighting, StreamWatch
 
 
@@ -62,6 +64,7 @@ class ShowStatus:
         playback: of a recording; None where the performer is live.
         frozen: whether the characters are frozen.
         frames: performed so far.
+        session: of the session that is open; None for none.
     """
 
     origin: str
@@ -71,6 +74,7 @@ class ShowStatus:
     playback: PlaybackStatus | None
     frozen: bool
     frames: int
+    session: SessionStatus | None = None
 
     @property
     def matching(self) -> bool:
@@ -85,6 +89,7 @@ def status_of(
     loop: FrameLoop,
     takes: Takes,
     playback: Playback | None,
+    session: LiveSession | None,
 ) -> ShowStatus:
     """Return the state of a show as it is now, out of its parts."""
     return ShowStatus(
@@ -97,6 +102,7 @@ def status_of(
         else PlaybackStatus(playback.position, playback.duration, playback.paused),
         frozen=loop.frozen,
         frames=loop.frames,
+        session=None if session is None else session_status(session),
     )
 
 

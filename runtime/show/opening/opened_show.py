@@ -300,4 +300,5 @@ class OpenedShow:
             self.loop,
             controls.takes,
             controls.playback,
+            controls.session,
         )
