@@ -66,9 +66,11 @@ class Timeline:
 
     Attributes:
         selected: the id of the selected clip; None for none.
+        ruler: (2,) [px] the upper left end of the ruler, as it was drawn last.
     """
 
     def __init__(self) -> None:
+        self.ruler = (0.0, 0.0)
         self.selected: int | None = None
         self._held: _Held | None = None
         self._scrubs = False
@@ -156,6 +158,7 @@ class Timeline:
         wide = room - names
         shown = max(document.duration, session.transport.duration, LEAST) * 1.04
         places = _Scale(at.x + names, wide / shown)
+        self.ruler = (places.left, at.y)
         height = ruler + rows * row
         imgui.invisible_button("lanes", ImVec2(room, height))
         over, active = imgui.is_item_hovered(), imgui.is_item_active()
@@ -184,7 +187,8 @@ class Timeline:
             held = None if clip_there is None else _grip(clip_there, places, mouse.x, scale)
             if held in (Grip.START, Grip.END):
                 imgui.set_mouse_cursor(imgui.MouseCursor_.resize_ew)
-            self._first = max(self._first - round(imgui.get_io().mouse_wheel), 0)
+            wanted = self._first - round(imgui.get_io().mouse_wheel)
+            self._first = min(max(wanted, 0), max(len(document.clips) - rows, 0))
             if imgui.is_item_activated():
                 self._take_hold(clip_there, held, places.time(mouse.x))
         if active:

@@ -49,11 +49,7 @@ def session_advice(status: SessionStatus) -> str:
     if status.mode is Mode.PLAYING:
         return "Space pauses, r records over it, a lets the performer move the characters."
     if status.mode is Mode.PAUSED:
-        return (
-            "Space plays on, r records from here, a lets the performer move the characters."
-        )
+        return "Space plays on, r records from here, a lets the performer move the characters."
     if status.clips:
-        return (
-            "Rehearse! Space plays the takes, r records one more, Delete redoes the last."
-        )
+        return "Rehearse! Space plays the takes, r records one more, Delete redoes the last."
     return "Rehearse! Press r to record a take."
