@@ -129,7 +129,8 @@ class Scene:
         self._marks = homes[:, None] + ways
         self._boxes, self.camera = boxes, camera
         below = CAPTION if self._captions else 0.0
-        across, high = camera.fills(boxes, self.stage.aspect) + (2.0 * MARGIN, 2.0 * MARGIN + below)
+        free = (2.0 * MARGIN, 2.0 * MARGIN + below)
+        across, high = np.add(camera.fills(boxes, self.stage.aspect), free)
         self._filled = min(across, 1.0), min(high, 1.0)
 
     def view_from_front(self) -> None:
