@@ -8,6 +8,7 @@ from imgui_bundle import icons_fontawesome_6 as icons
 from runtime.control.show_controls import ShowControls
 from runtime.panel.status_card import clock
 from runtime.panel.widgets import button, card
+from runtime.status.prompts import place_of_match
 from runtime.status.show_status import PlaybackStatus, ShowStatus
 
 
@@ -49,16 +50,15 @@ def _draw_playback(playback: PlaybackStatus, controls: ShowControls, scale: floa
 
 def _draw_matching(status: ShowStatus, controls: ShowControls) -> None:
     button("match-again", controls, icon=icons.ICON_FA_PERSON_RAYS)
-    imgui.same_line()
-    button("previous-match", controls, icon=icons.ICON_FA_CHEVRON_LEFT, label="")
-    imgui.same_line()
-    candidates = [each.candidate for each in status.characters if each.candidate is not None]
-    if candidates:
-        rank, count = candidates[0].rank, candidates[0].count
-        imgui.align_text_to_frame_padding()
-        imgui.text(f"{rank} of {count}" if rank else "by hand")
+    words = place_of_match(status, controls.match_controls.selected)
+    if words:
         imgui.same_line()
-    button("next-match", controls, icon=icons.ICON_FA_CHEVRON_RIGHT, label="")
+        button("previous-match", controls, icon=icons.ICON_FA_CHEVRON_LEFT, label="")
+        imgui.same_line()
+        imgui.align_text_to_frame_padding()
+        imgui.text(words)
+        imgui.same_line()
+        button("next-match", controls, icon=icons.ICON_FA_CHEVRON_RIGHT, label="")
     if status.matching:
         imgui.same_line()
         button("accept", controls, icon=icons.ICON_FA_CHECK)

@@ -8,9 +8,9 @@ from collections.abc import Sequence
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from runtime.panel.gui import GOLD, LACQUER, PAPER
-from runtime.panel.widgets import Colour, card, dot, letters
+from runtime.panel.widgets import Colour, card, dot, fitted, letters
 from runtime.status.notices import Notice
-from runtime.status.prompts import advice, countdown, headline
+from runtime.status.prompts import advice, countdown, details, headline, is_paused
 from runtime.status.show_status import ShowStatus
 from runtime.status.stream_watch import Sight
 
@@ -36,8 +36,14 @@ def draw_status(status: ShowStatus, left: float, scale: float, margin: float) ->
     width = min(WIDTH * scale, screen.x - left - margin)
     with card("status", left, margin, width):
         with letters(HEADLINE):
-            dot(SIGHTS[status.sighting.sight], 8.0 * scale)
-            imgui.text(headline(status))
+            dot(_light(status), 8.0 * scale)
+            imgui.text(fitted(headline(status), imgui.get_content_region_avail().x))
+            line = imgui.get_text_line_height()
+        imgui.same_line(0.0, 14.0 * scale)
+        imgui.set_cursor_pos_y(
+            imgui.get_cursor_pos_y() + 0.7 * (line - imgui.get_text_line_height())
+        )
+        imgui.text_disabled(fitted(details(status), imgui.get_content_region_avail().x))
         with letters(ADVICE):
             imgui.push_text_wrap_pos(0.0)
             imgui.text(advice(status))
@@ -45,6 +51,14 @@ def draw_status(status: ShowStatus, left: float, scale: float, margin: float) ->
         for take in status.recording:
             dot(LACQUER, 6.0 * scale)
             imgui.text(f"recording {take.path.name}: {clock(take.seconds)}, {take.frames} frames")
+
+
+def _light(status: ShowStatus) -> Colour:
+    """The colour of what is seen: green only while somebody drives the characters."""
+    sight = status.sighting.sight
+    if status.frozen or is_paused(status):
+        return GREY
+    return GOLD if sight is Sight.SEEN and status.matching else SIGHTS[sight]
 
 
 def draw_countdown(status: ShowStatus, scale: float) -> None:

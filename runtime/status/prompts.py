@@ -6,7 +6,7 @@ import math
 
 from runtime.session.transport import Mode
 from runtime.status.session_words import session_advice, session_headline
-from runtime.status.show_status import CharacterStatus, ShowStatus
+from runtime.status.show_status import CharacterStatus, PerformerStatus, ShowStatus
 from runtime.status.stream_watch import Sight, Sighting
 
 
@@ -14,24 +14,41 @@ def headline(status: ShowStatus) -> str:
     """What is seen of the performer, to be read from two metres away."""
     if status.session is not None and (words := session_headline(status.session)):
         return words
-    if _is_paused(status):
+    sighting = status.sighting
+    if is_paused(status):
         return "Paused"
     if status.frozen:
         return "Frozen"
+    if sighting.sight is Sight.SEEN and status.matching:
+        return "Looking for a match"
     return {
-        Sight.WAITING: "Waiting for a performer",
+        Sight.WAITING: f"Waiting for a performer, {_duration(sighting.seconds)}",
         Sight.NOT_UNDERSTOOD: "Something comes, but no performer",
-        Sight.SEEN: "Playing" if status.playback is not None else "Performer in view",
-        Sight.LOST: "Performer lost",
+        Sight.SEEN: _in_view(status) if _is_live(status) else f"{status.origin} plays",
+        Sight.LOST: f"Performer lost for {_duration(sighting.seconds)}",
         Sight.ENDED: "The end",
-    }[status.sighting.sight]
+    }[sighting.sight]
+
+
+def details(status: ShowStatus) -> str:
+    """Where the performer comes from, how many are in view, and what is seen of them."""
+    sighting, live = status.sighting, _is_live(status)
+    words = [] if status.origin in headline(status) else [status.origin]
+    if sighting.sight is Sight.SEEN and status.performers:
+        words.append(_people(status))
+        words += [
+            f"{one.seen} of {one.joints} joints seen" + _lost(one) for one in status.performers
+        ]
+        if live:
+            words.append(f"for {_duration(sighting.seconds)}")
+    return ", ".join(words)
 
 
 def advice(status: ShowStatus) -> str:
     """What to do next, in one or two sentences."""
     if status.session is not None and status.session.mode is not Mode.REHEARSING:
         return session_advice(status.session)
-    if _is_paused(status):
+    if is_paused(status):
         return "Space plays on. Drag the line below to go to another moment."
     if status.frozen:
         return "The characters stand still. Press e to let them move again."
@@ -47,6 +64,25 @@ def advice(status: ShowStatus) -> str:
         "look whether the sender still runs.",
         Sight.ENDED: "The recording is over. Home plays it again.",
     }[sighting.sight]
+
+
+def place_of_match(status: ShowStatus, selected: int | None) -> str:
+    """Which of how many matches is shown, and for whom; empty where there are none to step through.
+
+    Args:
+        status: of the show.
+        selected: the number of the character that the arrows are for; None for all.
+    """
+    chosen = status.characters if selected is None else [status.characters[selected]]
+    for character in chosen:
+        candidate = character.candidate
+        if candidate is None:
+            continue
+        whose = f" for {character.name}" if len(status.characters) > 1 else ""
+        if candidate.rank == 0:
+            return f"mapping of a file{whose}"
+        return f"match {candidate.rank} of {candidate.count}{whose}"
+    return ""
 
 
 def news(before: Sight, sighting: Sighting, origin: str) -> str:
@@ -70,7 +106,12 @@ def countdown(status: ShowStatus) -> float | None:
     return min(left, default=None)
 
 
-def _is_paused(status: ShowStatus) -> bool:
+def _is_live(status: ShowStatus) -> bool:
+    """Whether somebody performs now; the playback of a session is its own."""
+    return status.session is not None or status.playback is None
+
+
+def is_paused(status: ShowStatus) -> bool:
     """Whether a recording stands still; the time of a session does so while one rehearses."""
     return status.session is None and status.playback is not None and status.playback.paused
 
@@ -80,10 +121,11 @@ def _advice_on_matching(status: ShowStatus) -> str:
     if not matching and status.session is not None:
         return session_advice(status.session)
     if not matching:
-        return "Perform! Press m to match again, r to record a take, ? for all keys."
+        first = "Perform!" if _is_live(status) else "It plays by itself."
+        return f"{first} Press m to match again, r to record a take, ? for all keys."
     if all(character.countdown is None for character in matching):
         return "Step into view with your whole body."
-    live = status.playback is None
+    live = _is_live(status)
     strike = f"Strike the pose of {matching[0].name}: " if live else f"{matching[0].name}: "
     return f"{strike}{_candidate(matching[0])} {_accepting(status)}"
 
@@ -101,6 +143,24 @@ def _accepting(status: ShowStatus) -> str:
     if left is None:
         return "Enter accepts it, the arrows show others."
     return f"Keep still: it starts in {math.ceil(left)}. Enter starts it, the arrows show others."
+
+
+def _in_view(status: ShowStatus) -> str:
+    people = _count(status)
+    return "Performer in view" if people < 2 else f"{people} performers in view"
+
+
+def _people(status: ShowStatus) -> str:
+    people = _count(status)
+    return {0: "nobody", 1: "1 person"}.get(people, f"{people} people")
+
+
+def _count(status: ShowStatus) -> int:
+    return sum(one.seen > 0 for one in status.performers)
+
+
+def _lost(performer: PerformerStatus) -> str:
+    return f" ({' and '.join(performer.lost)} lost)" if performer.lost else ""
 
 
 def _listening(status: ShowStatus) -> str:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from replay.playback import Playback
 from runtime.driving.choices import Candidate
 from runtime.driving.driver import DrivenPart
+from runtime.driving.performer import Pose
 from runtime.session.live_session import LiveSession
 from runtime.show.act_group import Act
 from runtime.show.loop import FrameLoop
@@ -39,6 +40,21 @@ class CharacterStatus:
 
 
 @dataclass(frozen=True, slots=True)
+class PerformerStatus:
+    """What is seen of one performer now.
+
+    Attributes:
+        seen: joints that are seen.
+        joints: joints that there are.
+        lost: the parts that drive a character, in words, of which most is not seen.
+    """
+
+    seen: int
+    joints: int
+    lost: Sequence[str]
+
+
+@dataclass(frozen=True, slots=True)
 class PlaybackStatus:
     """Where a recording is.
 
@@ -65,6 +81,7 @@ class ShowStatus:
         frozen: whether the characters are frozen.
         frames: performed so far.
         session: of the session that is open; None for none.
+        performers: who is in view, or was.
     """
 
     origin: str
@@ -75,6 +92,7 @@ class ShowStatus:
     frozen: bool
     frames: int
     session: SessionStatus | None = None
+    performers: Sequence[PerformerStatus] = ()
 
     @property
     def matching(self) -> bool:
@@ -103,7 +121,15 @@ def status_of(
         frozen=loop.frozen,
         frames=loop.frames,
         session=None if session is None else session_status(session),
+        performers=[_performer(act, act.pose) for act in acts if act.pose is not None],
     )
+
+
+def _performer(act: Act, pose: Pose) -> PerformerStatus:
+    parts = [part for match in act.match_session.matches for part in match.parts]
+    lost = [part.name for part in parts if pose.filled[list(part.source)].mean() > 0.5]
+    count = len(pose.filled)
+    return PerformerStatus(count - int(pose.filled.sum()), count, list(dict.fromkeys(lost)))
 
 
 def _characters(act: Act) -> list[CharacterStatus]:

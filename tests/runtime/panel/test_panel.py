@@ -92,14 +92,14 @@ def test_the_legend_of_many_characters_leaves_the_bar_free(
 ) -> None:
     status = show._opened.status()
     bar = slice(_top_of_bar(screen.draw()), None)
-    before = screen.draw()[bar].copy()
+    before = screen.draw()[bar, :300].copy()
     part = DrivenPart(
         "left leg", "tentacle 4 of 8, the upper one on the left", (0,), (0,), RELATIVE
     )
     many = [replace(status.characters[0], name=f"squid {n}", parts=[part] * 8) for n in range(30)]
     screen.status = lambda: replace(status, characters=many)
     after = screen.draw()
-    np.testing.assert_array_equal(after[bar], before)
+    np.testing.assert_array_equal(after[bar, :300], before)
     assert not covered(after)[bar.start - 4 : bar.start].any(), "something lies above the bar"
     assert covered(after)[bar.start - 60 : bar.start - 20, 20:240].all(), "the room is used"
 
@@ -170,6 +170,17 @@ def _lit(controls: ShowControls, name: str) -> float:
     return read(controls)
 
 
+def test_the_light_is_green_only_while_somebody_drives(screen: Screen, show: StagedShow) -> None:
+    green = []
+    character = show._opened.status().characters[0]
+    for matching in (True, False):
+        status = replace(show._opened.status(), characters=[replace(character, matching=matching)])
+        screen.status = lambda status=status: status
+        red, high, blue = np.moveaxis(screen.draw()[20:60, 20:60].astype(int), 2, 0)
+        green.append(bool(((high > red + 20) & (high > blue + 20)).any()))
+    assert green == [False, True]
+
+
 def test_what_is_done_is_said_for_a_while(screen: Screen, show: StagedShow) -> None:
     show.controls.view.panel = False
     screen.draw()
@@ -202,6 +213,8 @@ def test_the_state_of_a_show_is_told_whole(show: StagedShow) -> None:
     (character,) = status.characters
     assert character.name == show.puppet.character.name
     assert not status.frozen
+    (performer,) = status.performers
+    assert performer.seen == performer.joints == len(show.performer.skeleton.names)
     show.takes.start()
     (take,) = show._opened.status().recording
     assert take.path.name == "out-1.mcap"

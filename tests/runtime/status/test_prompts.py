@@ -7,8 +7,13 @@ from dataclasses import replace
 import pytest
 
 from runtime.driving.choices import Candidate
-from runtime.status.prompts import advice, countdown, headline, news
-from runtime.status.show_status import CharacterStatus, PlaybackStatus, ShowStatus
+from runtime.status.prompts import advice, countdown, details, headline, news, place_of_match
+from runtime.status.show_status import (
+    CharacterStatus,
+    PerformerStatus,
+    PlaybackStatus,
+    ShowStatus,
+)
 from runtime.status.stream_watch import Sight, Sighting
 
 SQUID = CharacterStatus("squid", [], True, False, None, None)
@@ -24,6 +29,32 @@ def test_each_sight_has_words_of_its_own() -> None:
     assert len(headlines) == len(Sight)
     assert len({advice(seen(sight)) for sight in Sight}) == len(Sight)
     assert all(len(words) <= 34 for words in headlines), "to be read from two metres"
+
+
+def test_it_is_said_who_is_seen_and_what_of_them_is_lost() -> None:
+    whole, half = PerformerStatus(25, 25, []), PerformerStatus(19, 25, ["left arm", "head"])
+    said = details(replace(LIVE, performers=[whole, half]))
+    assert "vmc://127.0.0.1:39539" in said
+    assert "2 people" in said
+    assert "19 of 25 joints seen (left arm and head lost)" in said
+    assert "for 2 s" in said
+    assert "2 performers" in headline(replace(LIVE, performers=[whole, half]))
+    assert "nobody" in details(replace(LIVE, performers=[PerformerStatus(0, 25, [])]))
+
+
+def test_since_when_it_is_so_can_be_read_from_afar() -> None:
+    assert "12 s" in headline(seen(Sight.WAITING))
+    assert "12 s" in headline(seen(Sight.LOST))
+
+
+def test_a_recording_that_plays_is_named_and_asks_nobody_to_perform() -> None:
+    plays = replace(LIVE, origin="dab.bvh", playback=PlaybackStatus(1.0, 9.0, False))
+    assert headline(plays) == "dab.bvh plays"
+    assert "Perform" not in advice(plays)
+    assert "Perform" in advice(LIVE)
+    matched = replace(plays, characters=[replace(SQUID, matching=True)])
+    assert headline(matched) == "Looking for a match"
+    assert "dab.bvh" in details(matched)
 
 
 def test_waiting_says_where_it_listens() -> None:
@@ -54,6 +85,18 @@ def test_matching_names_the_match_and_the_seconds_left() -> None:
     waits = replace(proposed, countdown=float("inf"))
     assert countdown(replace(LIVE, characters=[waits])) is None
     assert "Enter accepts" in advice(replace(LIVE, characters=[waits]))
+
+
+def test_the_place_of_a_match_says_for_whom_and_nothing_where_there_is_none() -> None:
+    pig = replace(SQUID, name="pig")
+    squid = replace(SQUID, candidate=Candidate(1, 21, 0.8))
+    both = replace(LIVE, characters=[pig, squid])
+    assert place_of_match(both, None) == "match 1 of 21 for squid"
+    assert place_of_match(both, 0) == ""
+    assert place_of_match(both, 1) == "match 1 of 21 for squid"
+    assert place_of_match(replace(LIVE, characters=[squid]), None) == "match 1 of 21"
+    by_hand = replace(squid, candidate=Candidate(0, 21, 0.8))
+    assert "file" in place_of_match(replace(LIVE, characters=[by_hand]), None)
 
 
 def test_pauses_and_freezes_say_how_to_go_on() -> None:
