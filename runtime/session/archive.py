@@ -23,6 +23,7 @@ MOST_ENTRIES = 100_000
 MOST_ENTRY = 1 << 30  # [bytes] of one file in the zip
 MOST_RATIO, MOST_SMALL = 200, 64 << 20  # unpacked files are so many times as large, or so large
 _CHUNK = 1 << 20
+_UNPACKED = f".{DOCUMENT}"  # the JSON until all other files are there
 _HEADER = struct.Struct("<4sHHHHHIIIHH")
 _MAGIC = b"PK\x03\x04"
 _STORED, _DEFLATED = 0, 8
@@ -49,7 +50,7 @@ def pack(folder: Path, files: list[str], path: Path) -> None:
 
 
 def unpack(path: Path, folder: Path) -> list[str]:
-    """Put the files of a zip into a folder; return what is lost, a line each.
+    """Put the files of a zip into a folder, the JSON last; return what is lost, a line each.
 
     Raises:
         InputError: it cannot be read, or is no zip at all.
@@ -67,11 +68,13 @@ def unpack(path: Path, folder: Path) -> list[str]:
             for name, chunks in entries:
                 if not _is_inside(name):
                     continue
-                target = folder / name
+                target = folder / (_UNPACKED if name == DOCUMENT else name)
                 target.parent.mkdir(parents=True, exist_ok=True)
                 if why := _copy(chunks, target, budget):
                     target.unlink(missing_ok=True)
                     lost.append(f"{name} is damaged: {why}")
+        if (folder / _UNPACKED).is_file():
+            (folder / _UNPACKED).replace(folder / DOCUMENT)
     except OSError as error:
         raise InputError(f"cannot read {path}: {error.strerror or error}") from error
     if not (folder / DOCUMENT).is_file():

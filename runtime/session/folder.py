@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 import shutil
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from replay.text_file import file_bytes
 from runtime.output.files.whole_file import whole_file, writing
 from runtime.session import codec
 from runtime.session.document import Session
+from runtime.session.lock import FolderLock
 from runtime.session.performance import Performance
 from runtime.session.performance_file import read_performance, save_performance
 
@@ -44,18 +46,23 @@ class Opened:
 class SessionFolder:
     """Reads and writes the files of one session.
 
+    No other program can open the folder until it is left, removed, or this one ends.
+
     Args:
         path: the folder; made if it is not there.
 
     Raises:
-        InputError: it cannot be made.
+        InputError: it cannot be made, or another program works in it.
     """
 
     def __init__(self, path: Path) -> None:
         self.path = path
+        self._lock = FolderLock(path)
         with writing(path):
+            if not self.exists:
+                self._clear()  # of a program that was killed before it had written the session
             for name in (PERFORMANCES, RECORDINGS, CHARACTERS):
-                (path / name).mkdir(parents=True, exist_ok=True)
+                (path / name).mkdir(exist_ok=True)
         self._performances: dict[str, Performance] = {}
 
     @property
@@ -108,9 +115,23 @@ class SessionFolder:
         except ValueError as error:
             raise InputError(f"cannot read {path}: it is damaged ({error})") from error
 
+    def leave(self) -> None:
+        """Let other programs open the folder, as it is."""
+        self._lock.release()
+
     def remove(self) -> None:
         """Delete the folder and all that is in it."""
-        shutil.rmtree(self.path, ignore_errors=True)
+        self._clear()
+        self._lock.remove()
+
+    def _clear(self) -> None:
+        """Delete all files, the JSON first: a session that has lost only some is never read."""
+        with suppress(OSError):
+            (self.path / DOCUMENT).unlink(missing_ok=True)
+        for name in (PERFORMANCES, RECORDINGS, CHARACTERS):
+            shutil.rmtree(self.path / name, ignore_errors=True)
+        for partial in self.path.glob(".*"):
+            partial.unlink(missing_ok=True)
 
     def _read(self, document: object) -> Opened:
         lost: dict[str, str] = {}

@@ -9,7 +9,7 @@ from pathlib import Path
 from devices.errors import InputError
 from devices.skeleton import Skeleton
 from runtime.puppet.puppet import Puppet
-from runtime.session import edits
+from runtime.session import edits, unfinished
 from runtime.session.actor_layers import ActorLayers, Cue
 from runtime.session.document import Session, Take, next_id
 from runtime.session.performance import Performance
@@ -146,6 +146,13 @@ class LiveSession:
         self.transport.record()
         return True
 
+    def running(self, recording: str) -> None:
+        """Note on the disk that the take that has begun is recorded in this file."""
+        try:
+            unfinished.begin(self.recordings, recording, self._start)
+        except InputError as error:
+            self._warn(str(error))
+
     def stop(self, recording: str = "") -> None:
         """End the take: it becomes a clip where it was performed, and can be played from there.
 
@@ -156,6 +163,7 @@ class LiveSession:
             return
         takes = [(layers, layers.stop()) for layers in self._recorded]
         self._add([(one, made) for one, made in takes if made is not None], self._start, recording)
+        unfinished.end(self.recordings)
         self.transport.rehearse()
         self.transport.go_to(self._start)
 

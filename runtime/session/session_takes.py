@@ -11,6 +11,8 @@ def record_into(session: LiveSession, takes: Takes, on: bool) -> None:
     if on:
         if not session.recording and session.record():
             takes.start()
+            if takes.recording:
+                session.running(takes.running[-1].path.name)
         return
     file = takes.running[-1].path.name if takes.recording else ""
     takes.stop()

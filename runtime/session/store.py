@@ -15,6 +15,7 @@ from runtime.session.archive import SUFFIX, pack, unpack
 from runtime.session.document import Session
 from runtime.session.folder import CHARACTERS, DOCUMENT, PERFORMANCES, RECORDINGS, SessionFolder
 from runtime.session.performance import Performance
+from runtime.session.unfinished import rescue
 from runtime.session.versions import Versions
 
 UNSAVED = ".unsaved"
@@ -35,7 +36,7 @@ class SessionStore:
             session; empty where nobody has said.
 
     Raises:
-        InputError: it cannot be read or written, or is of a newer version.
+        InputError: it cannot be read or written, is of a newer version, or is open elsewhere.
     """
 
     def __init__(self, path: Path) -> None:
@@ -65,9 +66,12 @@ class SessionStore:
                 raise InputError(f"{path}: {error}") from error
             session = opened.session
             self.notes += opened.lost
+        damaged = len(self.notes) > int(recovered)
+        if recovered:
+            finished = {take.recording for take in session.takes}
+            self.notes += rescue(self.folder.recordings, finished, path)
         self.versions = Versions(session)
-        self._damaged = len(self.notes) > int(recovered)
-        if self._damaged and path.is_file():
+        if damaged and path.is_file():
             kept = path.with_name(f"{path.stem}-damaged{path.suffix}")
             kept.write_bytes(path.read_bytes())
             self.notes.append(f"the damaged file is kept as {kept}")
@@ -155,6 +159,7 @@ class SessionStore:
         """Delete the folder of a session that was never worked on; else leave all as it is."""
         if not self._begun and not self._recovered:
             self.folder.remove()
+        self.folder.leave()
 
     def _files(self) -> list[str]:
         """The files that the version that counts is made of; the JSON first."""

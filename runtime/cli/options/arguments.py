@@ -13,6 +13,7 @@ import string
 from runtime.show.settings import LEAST_SIDE, MOST_SIDE, MOST_STIFFNESS, MOST_VOLUME_GAIN
 
 MOST_SECONDS = 3600.0  # of a countdown
+MOST_MOMENT = 1e6  # [s] of a session
 
 
 def size(text: str) -> tuple[int, int]:
@@ -40,6 +41,11 @@ def positive(text: str) -> float:
     if not 0.0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"expected a finite number above 0, got {text!r}")
     return value
+
+
+def seconds(text: str) -> float:
+    """A finite number of seconds from 0."""
+    return _between(text, 0.0, MOST_MOMENT)
 
 
 def seconds_or_never(text: str) -> float:

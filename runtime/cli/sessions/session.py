@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from runtime.cli.live import for_performers, is_camera
+from runtime.cli.options.arguments import seconds
 from runtime.cli.options.input_options import add_input_options, stated
 from runtime.cli.options.show_options import add_character_option, add_show_options
 
@@ -35,6 +36,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--take", action="store_true", help="begin a take at once, as pressing r does"
     )
+    parser.add_argument(
+        "--at",
+        type=seconds,
+        default=0.0,
+        metavar="S",
+        help="let the time stand at this second of the session",
+    )
     add_character_option(parser, required=False)
     add_input_options(parser)
     add_show_options(parser)
@@ -59,17 +67,21 @@ def run(options: argparse.Namespace) -> int:
             origin=origin,
             read=[("--recording", options.recording)] if options.recording else [],
             session=store,
-            began=_begin_take if options.take else lambda _: None,
+            began=lambda show: _begin(show, options.at, take=options.take),
         )
     except BaseException:
         store.abandon()
         raise
 
 
-def _begin_take(show: Show) -> None:
+def _begin(show: Show, at: float, *, take: bool) -> None:
+    """Let the time stand at a second of the session, and begin a take there if one is asked for."""
     from runtime.control.actions import press
 
-    press("record", show.controls)
+    if show.controls.session is not None:
+        show.controls.session.transport.go_to(at)
+    if take:
+        press("record", show.controls)
 
 
 def _source(options: argparse.Namespace) -> SkeletonStream:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import random
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from devices.errors import InputError
 from devices.skeleton import Skeleton
+from runtime.session import edits
 from runtime.session.document import Actor, Session, Take
 from runtime.session.edits import with_actor, with_take
 from runtime.session.performance import Performance
@@ -45,3 +49,29 @@ def session(*takes: Take, start: float = 0.0) -> Session:
     for each in takes:
         made = with_take(made, each, start)
     return made
+
+
+def random_edit(made: Session, dice: random.Random) -> Session:
+    """Some edit of some clip; a new take where there is none."""
+    if not made.clips or dice.random() < 0.1:
+        return edits.with_take(made, take(dice.uniform(-1.0, 1.0)), dice.uniform(0.0, 9.0))
+    clip = dice.choice(made.clips)
+    try:
+        return dice.choice(
+            [
+                lambda: edits.moved(made, clip.id, dice.uniform(-1.0, 9.0)),
+                lambda: edits.trimmed(made, clip.id, dice.uniform(0, 9), dice.uniform(0, 9)),
+                lambda: edits.split(made, clip.id, dice.uniform(clip.start, clip.end)),
+                lambda: edits.paced(made, clip.id, dice.uniform(0.1, 10.0)),
+                lambda: edits.looped(made, clip.id, dice.uniform(0.1, 10.0)),
+                lambda: edits.weighted(made, clip.id, dice.random()),
+                lambda: edits.muted(made, clip.id, not clip.muted),
+                lambda: edits.made_additive(made, clip.id, not clip.additive),
+                lambda: edits.copied(made, clip.id, dice.uniform(0.0, 9.0)),
+                lambda: edits.raised(made, clip.id, dice.randint(-3, 3)),
+                lambda: edits.without_clip(made, clip.id),
+                lambda: edits.marked(made, dice.uniform(0.0, 9.0), "here"),
+            ]
+        )()
+    except InputError:
+        return made

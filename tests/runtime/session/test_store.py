@@ -18,11 +18,10 @@ from hypothesis import strategies as st
 from devices.errors import InputError
 from runtime.session import edits
 from runtime.session.codec import VERSION, as_json
-from runtime.session.document import Session
 from runtime.session.performance_file import read_performance, save_performance
 from runtime.session.store import SessionStore
 from runtime.session.versions import Versions
-from tests.runtime.session.sessions import chain, performance, session, take
+from tests.runtime.session.sessions import chain, performance, random_edit, session, take
 
 
 def filled(store: SessionStore, *angles: float) -> None:
@@ -53,6 +52,7 @@ def test_a_killed_session_comes_back_with_its_last_edit(tmp_path: Path) -> None:
     path = tmp_path / "show.bunraku"
     store = SessionStore(path)
     filled(store, 1.0, -0.5)
+    store.folder.leave()  # as the end of its process does
     again = SessionStore(path)  # the first was never closed
     assert again.session == store.session
     assert "not closed" in again.notes[0]
@@ -150,32 +150,6 @@ def test_a_bomb_is_refused(tmp_path: Path) -> None:
         packed.writestr("performances/a.glb", bytes(100 << 20))
     with pytest.raises(InputError, match="far more than its size"):
         SessionStore(path)
-
-
-def random_edit(made: Session, dice: random.Random) -> Session:
-    """Some edit of some clip; a new take where there is none."""
-    if not made.clips or dice.random() < 0.1:
-        return edits.with_take(made, take(dice.uniform(-1.0, 1.0)), dice.uniform(0.0, 9.0))
-    clip = dice.choice(made.clips)
-    try:
-        return dice.choice(
-            [
-                lambda: edits.moved(made, clip.id, dice.uniform(-1.0, 9.0)),
-                lambda: edits.trimmed(made, clip.id, dice.uniform(0, 9), dice.uniform(0, 9)),
-                lambda: edits.split(made, clip.id, dice.uniform(clip.start, clip.end)),
-                lambda: edits.paced(made, clip.id, dice.uniform(0.1, 10.0)),
-                lambda: edits.looped(made, clip.id, dice.uniform(0.1, 10.0)),
-                lambda: edits.weighted(made, clip.id, dice.random()),
-                lambda: edits.muted(made, clip.id, not clip.muted),
-                lambda: edits.made_additive(made, clip.id, not clip.additive),
-                lambda: edits.copied(made, clip.id, dice.uniform(0.0, 9.0)),
-                lambda: edits.raised(made, clip.id, dice.randint(-3, 3)),
-                lambda: edits.without_clip(made, clip.id),
-                lambda: edits.marked(made, dice.uniform(0.0, 9.0), "here"),
-            ]
-        )()
-    except InputError:
-        return made
 
 
 @settings(max_examples=5, deadline=None)
