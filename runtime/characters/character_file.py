@@ -11,6 +11,7 @@ from scipy.sparse import csr_array
 
 from devices.errors import InputError
 from devices.skeleton import Skeleton
+from replay.foreign import conversion_hint
 from runtime.characters.builtin import BUILTIN
 from runtime.characters.cache import cached_skeleton
 from runtime.characters.character import Character, Surface
@@ -31,18 +32,6 @@ from runtime.characters.weld import first_occurrences, weld, welded_weights
 RIG_SUFFIXES = (".glb", ".gltf", ".vrm")
 GOLDEN = (5.0**0.5 - 1.0) / 2.0
 SUFFIXES = MESH_SUFFIXES + RIG_SUFFIXES
-_BLENDER = "open it in Blender (File, Import)"
-CONVERTED = {
-    **dict.fromkeys((".fbx", ".dae", ".abc", ".usd", ".usda", ".usdc", ".usdz", ".x3d"), _BLENDER),
-    ".blend": "open it in Blender",
-    ".pmx": "open it in Blender with mmd_tools",
-    ".pmd": "open it in Blender with mmd_tools",
-    ".3ds": "open it in an older Blender",
-    ".max": "open it in 3ds Max",
-    ".ma": "open it in Maya",
-    ".mb": "open it in Maya",
-}
-"""What to open the formats with that are known and not read."""
 
 
 def read_character(path: Path) -> Character:
@@ -54,11 +43,9 @@ def read_character(path: Path) -> Character:
     Raises:
         InputError: there is no such file, its format is not known, or it holds no usable surface.
     """
-    if (suffix := path.suffix.lower()) in CONVERTED:
-        raise InputError(
-            f"{path}: {suffix} is not read; {CONVERTED[suffix]} and export glb from it"
-        )
-    if suffix not in SUFFIXES:
+    if path.suffix.lower() not in SUFFIXES:
+        if (hint := conversion_hint(path)) is not None:
+            raise InputError(f"{path}: {hint}")
         raise InputError(
             f"{path}: no character is read from {path.suffix or 'a file without a suffix'}; use "
             f"{', '.join(SUFFIXES)}, or a built-in one: {', '.join(BUILTIN)}"
