@@ -52,7 +52,10 @@ def _conditioning(name: str, label: str, text: str) -> Action:
     """Build the action of one switch of the conditioning."""
 
     def write(controls: ShowControls, on: bool) -> None:
-        controls.conditioning.switch(name, on)
+        if on is not getattr(controls.conditioning, name):
+            controls.conditioning.switch(name, on)
+            for puppet in controls.puppets:
+                puppet.ease()
 
     return switch(label, text, lambda controls: bool(getattr(controls.conditioning, name)), write)
 
@@ -275,7 +278,7 @@ def press(name: str, controls: ShowControls) -> None:
         return
     before = controls.notices.latest
     action.press(controls)
-    controls.loop.perform_again()
+    _perform_again(controls)
     if controls.notices.latest is before:  # it has not spoken for itself
         controls.notices.show(_done(action, controls))
 
@@ -285,7 +288,15 @@ def set_value(name: str, value: float, controls: ShowControls) -> None:
     action = ACTIONS[name]
     if action.write is not None:
         action.write(controls, value)
-        controls.loop.perform_again()
+        _perform_again(controls)
+
+
+def _perform_again(controls: ShowControls) -> None:
+    """Let what has changed be seen where no frame comes; in a pause at once."""
+    controls.loop.perform_again()
+    if _is_paused(controls):
+        for puppet in controls.puppets:
+            puppet.change_at_once()
 
 
 def _done(action: Action, controls: ShowControls) -> str:

@@ -9,6 +9,7 @@ from runtime.control.show_controls import ShowControls
 from runtime.puppet.deformable_surface import Elasticity
 
 STEP = 0.1  # share of a slider's range that one key press moves it
+DRAGGED = 0.05  # of the range: a fader that is dragged moves by less at once, and eases itself
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,10 +39,15 @@ class Slider:
 
     def write(self, controls: ShowControls, share: float) -> None:
         """Set the selected characters to a share of the fader's range."""
-        for surface in (puppet.surface for puppet in controls.selected):
-            changed: Elasticity = replace(surface.elasticity, **{self.field: share * self.most})
-            if changed != surface.elasticity:
-                surface.elasticity = changed
+        for puppet in controls.selected:
+            elasticity, value = puppet.surface.elasticity, share * self.most
+            before = float(getattr(elasticity, self.field))
+            if value == before:
+                continue
+            if abs(value - before) > DRAGGED * self.most or 0.0 in (value, before):
+                puppet.ease()
+            changed: Elasticity = replace(elasticity, **{self.field: value})
+            puppet.surface.elasticity = changed
 
     def move(self, controls: ShowControls, by: float) -> None:
         """Move the fader by a share of its range; a value beyond its upper end stays."""

@@ -15,6 +15,7 @@ from runtime.driving.driver import Driver, Highlight, MappedDriver
 from runtime.driving.performer import Pose
 from runtime.driving.targets import HandleTargets, PosedNodes, SkinnedTargets, Targets
 from runtime.puppet.bound_skeleton import BoundSkeleton
+from runtime.puppet.change_blend import ChangeBlend, ChangeBlendState
 from runtime.puppet.deformable_surface import DeformableSurface, SurfaceState
 from runtime.puppet.face import Face
 from runtime.puppet.placement import Stance, put_on_stage
@@ -67,6 +68,8 @@ class PuppetState:
         driver_kind: the class of the driver; None without one.
         driver: of the driver.
         face: (T,) the weights of the character's morph targets.
+        change_blend: of the blend over live changes.
+        shown: (N, 3) [m] the vertices as they were shown; None before.
     """
 
     surface: SurfaceState
@@ -76,6 +79,8 @@ class PuppetState:
     driver_kind: type[Driver] | None
     driver: Any
     face: Array
+    change_blend: ChangeBlendState
+    shown: Array | None
 
 
 class Puppet:
@@ -119,6 +124,8 @@ class Puppet:
         self.layers: Layers | None = None
         self.travel = Travel()
         self.face = Face(character, tell)
+        self._change_blend = ChangeBlend(skeleton)
+        self._is_shown = False
         self._targets = skeleton.at_rest
         self._standing = [np.empty_like(character.vertices) for _ in range(2)]
         self._root: Array = skeleton.tree.positions[skeleton.root]
@@ -128,9 +135,20 @@ class Puppet:
         """Let another driver move the character from the next pose on; the surface stays."""
         self.driver = driver
 
+    def ease(self) -> None:
+        """Let the next pose depart from what is shown, as after a freeze, whatever changes now."""
+        if self._is_shown:
+            self._change_blend.begin(self._targets, self._standing[0])
+
+    def change_at_once(self) -> None:
+        """Show changes with the next pose, as in a pause, in which no time passes to ease them."""
+        self._change_blend.reset()
+
     def rest(self) -> None:
         """Go back to the rest pose, unless the driver has other targets for the next pose."""
         self._targets = self.bound_skeleton.at_rest
+        self.change_at_once()
+        self._is_shown = False
         self.face.follow(None)
 
     def follow(self, pose: Pose) -> None:
@@ -138,11 +156,14 @@ class Puppet:
         self.face.follow(pose.blends)
         if self.driver is not None:
             targets = self.driver.targets(pose)
-            self._targets = targets if self.layers is None else self.layers.over(targets, pose.time)
+            if self.layers is not None:
+                targets = self.layers.over(targets, pose.time)
+            self._targets = self._change_blend.follow(targets, pose.time)
         self.travel.follow(pose.time)
 
     def deform(self) -> Motion:
         """Return the character as its targets say, on the stage."""
+        self._is_shown = True
         return self._move(self._before_shown)
 
     def settle(self) -> None:
@@ -164,6 +185,8 @@ class Puppet:
         """Go on as if no pose had been struck; the targets stay."""
         self.surface.reset()
         self.travel.reset()
+        self._change_blend.reset()
+        self._is_shown = False
         if self.driver is not None:
             self.driver.reset()
 
@@ -178,6 +201,8 @@ class Puppet:
             None if driver is None else type(driver),
             None if driver is None else driver.snapshot(),
             self.face.weights.copy(),
+            self._change_blend.snapshot(),
+            self._standing[0].copy() if self._is_shown else None,
         )
 
     def restore(self, state: PuppetState) -> None:
@@ -189,6 +214,10 @@ class Puppet:
         self.face.restore(state.face)
         self._targets, self._stance = state.targets, state.stance
         self.travel.restore(state.travel)
+        self._change_blend.restore(state.change_blend)
+        self._is_shown = state.shown is not None
+        if state.shown is not None:
+            self._standing[0][:] = state.shown
         if self.driver is None:
             return
         if type(self.driver) is state.driver_kind:
@@ -236,6 +265,7 @@ class Puppet:
         placement = self.travel.of(targets.placement)
         self._stance = put_on_stage(vertices, placement, self._root, standing)
         self.face.move(standing)
+        self._change_blend.ease(standing)
         nodes = None if targets.nodes is None else self._stance.place_nodes(targets.nodes)
         return Motion(standing, nodes, self.face.weights if len(self.face.weights) else None)
 

@@ -65,7 +65,6 @@ class PuppetMatch:
         make_driver: makes the puppet's driver.
 
     Attributes:
-        puppet: see above.
         rest: the performer's rest state; None while the puppet is not driven.
         matching: whether a match is looked for.
     """
@@ -193,6 +192,8 @@ class PuppetMatch:
         if isinstance(shown, MappedDriver):
             shown.show(shown.mapping, view)
         shown.prepare(self._clip, rest)
+        if self.rest is not None or not isinstance(shown, MappedDriver):
+            self.puppet.ease()  # a match departs from the rest pose as it is
         if shown is not self._driver:
             self._drive_with(shown)
             self._propose(None)
@@ -211,6 +212,7 @@ class PuppetMatch:
             driver.gains = gains
         else:
             driver.prepare(self._clip, rest)
+        self.puppet.ease()
         self.rest = rest
 
     def rehearse(self, clip: Sequence[Pose], states: Sequence[Rest], view: Array) -> None:
@@ -319,15 +321,15 @@ class PuppetMatch:
         driver.prepare(self._clip, self.rest)
         if isinstance(driver, MappedDriver) and isinstance(before, MappedDriver):
             driver.gains = before.gains
+        self.puppet.ease()
         self._make_usual, self._matched = make_driver, False
         self._drive_with(driver)
 
     def _make(self, make_driver: DriverFactory) -> Driver:
         puppet = self.puppet
-        skeleton = self._performer.skeleton
         driver = make_driver(
             Pairing(
-                skeleton,
+                self._performer.skeleton,
                 tuple(self._performer.joints),
                 puppet.character,
                 puppet.bound_skeleton,

@@ -71,11 +71,11 @@ class Stage:
         self.loop, self.controls = self.show.controls.loop, self.show.controls
 
     def put_back(self, state: tuple, settings: dict[str, float]) -> None:
+        for name, value in settings.items():  # first, as characters ease over what changes
+            ACTIONS[name].write(self.controls, value)
         loop, player = state
         self.loop.restore(loop)
         self.player.restore(player)
-        for name, value in settings.items():
-            ACTIONS[name].write(self.controls, value)
 
     def __repr__(self) -> str:
         return "the stage"  # not all that it holds, which hypothesis would print

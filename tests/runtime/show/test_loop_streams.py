@@ -96,10 +96,11 @@ def test_a_mirror_that_is_switched_turns_the_character_over(puppet: Puppet) -> N
         [(pose(T_POSE), False), (raised, False), (raised, True), (raised, False)]
     ):
         switches.mirror = mirror
-        performer.follow(captured(place, index * 0.1))
-        match_session.direct(captured(place, index * 0.1))
-        puppet.follow(performer.pose)
-        nodes = puppet.deform().nodes.positions
+        for time in index + np.arange(5) * 0.1:  # the character eases over
+            performer.follow(captured(place, time))
+            match_session.direct(captured(place, time))
+            puppet.follow(performer.pose)
+            nodes = puppet.deform().nodes.positions
         tops.append((nodes[left, 1], nodes[right, 1]))
     assert tops[1][0] > tops[0][0] + 0.3
     np.testing.assert_allclose(tops[2], tops[1][::-1], atol=0.03)
@@ -115,7 +116,7 @@ def test_a_pose_that_is_held_becomes_the_rest_state_without_a_hand_free(puppet: 
         performer, [puppet], lambda: FRONT_VIEW, Choices(), [Mapping(ARMS)]
     )
     bent = {"ElbowLeft": (0.0, 0.0, 1.5), "ElbowRight": (0.0, 1.5, 0.0)}
-    wire = Wire([captured(pose(bent if i == 0 else T_POSE), i / 10.0) for i in range(14)])
+    wire = Wire([captured(pose(bent if i == 0 else T_POSE), i / 10.0) for i in range(18)])
     kept = Kept()
     loop = FrameLoop(
         wire,

@@ -51,6 +51,7 @@ REMEMBERS = {
     "runtime.driving.unfreeze_blend.UnfreezeBlend",
     "runtime.puppet.deformable_surface.DeformableSurface",
     "runtime.puppet.puppet.Puppet",
+    "runtime.puppet.change_blend.ChangeBlend",
     "runtime.puppet.travel.Travel",
     "runtime.show.act_group.Act",
     "runtime.show.arrivals.Arrivals",
