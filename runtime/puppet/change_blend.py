@@ -99,13 +99,19 @@ class ChangeBlend:
         self._rest_of_way, self._passed, self._at = state.rest_of_way, state.passed, state.at
 
     def begin(self, targets: Targets, vertices: Array) -> None:
-        """Depart from what is shown with the next frame.
+        """Depart from what is shown with the next frame, if anything is.
 
         Args:
             targets: as they were blended.
             vertices: (N, 3) [m] on the stage.
         """
-        self._shown = _Shown(targets, vertices.copy())
+        if self.has_shown:
+            self._shown = _Shown(targets, vertices.copy())
+
+    @property
+    def has_shown(self) -> bool:
+        """Whether any frame was followed."""
+        return self._at > -math.inf
 
     def follow(self, targets: Targets, time: float) -> Targets:
         """Return the targets to show at `time` [s] of the performer; for a moment a blend.

@@ -125,9 +125,8 @@ class Puppet:
         self.travel = Travel()
         self.face = Face(character, tell)
         self._change_blend = ChangeBlend(skeleton)
-        self._is_shown = False
         self._targets = skeleton.at_rest
-        self._standing = [np.empty_like(character.vertices) for _ in range(2)]
+        self._standing = [character.vertices.astype(np.float64) for _ in range(2)]
         self._root: Array = skeleton.tree.positions[skeleton.root]
         self._stance = Stance(0.0, self._root, np.zeros(3))
 
@@ -137,8 +136,7 @@ class Puppet:
 
     def ease(self) -> None:
         """Let the next pose depart from what is shown, as after a freeze, whatever changes now."""
-        if self._is_shown:
-            self._change_blend.begin(self._targets, self._standing[0])
+        self._change_blend.begin(self._targets, self._standing[0])
 
     def change_at_once(self) -> None:
         """Show changes with the next pose, as in a pause, in which no time passes to ease them."""
@@ -148,7 +146,6 @@ class Puppet:
         """Go back to the rest pose, unless the driver has other targets for the next pose."""
         self._targets = self.bound_skeleton.at_rest
         self.change_at_once()
-        self._is_shown = False
         self.face.follow(None)
 
     def follow(self, pose: Pose) -> None:
@@ -163,7 +160,6 @@ class Puppet:
 
     def deform(self) -> Motion:
         """Return the character as its targets say, on the stage."""
-        self._is_shown = True
         return self._move(self._before_shown)
 
     def settle(self) -> None:
@@ -186,7 +182,6 @@ class Puppet:
         self.surface.reset()
         self.travel.reset()
         self._change_blend.reset()
-        self._is_shown = False
         if self.driver is not None:
             self.driver.reset()
 
@@ -202,7 +197,7 @@ class Puppet:
             None if driver is None else driver.snapshot(),
             self.face.weights.copy(),
             self._change_blend.snapshot(),
-            self._standing[0].copy() if self._is_shown else None,
+            self._standing[0].copy() if self._change_blend.has_shown else None,
         )
 
     def restore(self, state: PuppetState) -> None:
@@ -215,7 +210,6 @@ class Puppet:
         self._targets, self._stance = state.targets, state.stance
         self.travel.restore(state.travel)
         self._change_blend.restore(state.change_blend)
-        self._is_shown = state.shown is not None
         if state.shown is not None:
             self._standing[0][:] = state.shown
         if self.driver is None:
