@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from devices.bodies.body_plan import SIDES, BodyPlan, Chain, Limb
+from devices.bodies.hand_plan import body_of_hands
 from devices.bodies.joint_labels import first_of, label_joints
 from devices.bodies.joint_names import FINGERS, BodyPart, Kind, Side, part_of_name
 from devices.bodies.joint_names import Limb as LimbName
@@ -27,7 +28,7 @@ def plan_by_names(skeleton: Skeleton) -> BodyPlan | None:
     """Return the plan of a body whose joints have known names or a known shape.
 
     Wings and fins are arms where there are no others. Limbs whose joints are all named alike are
-    divided by their shape (`devices.bodies.limb_segments`).
+    divided by their shape (`devices.bodies.limb_segments`). Two hands without a body are its arms.
 
     Returns:
         None where neither both arms nor both legs are known, for a body with more than two pairs of
@@ -35,8 +36,10 @@ def plan_by_names(skeleton: Skeleton) -> BodyPlan | None:
     """
     labels = _Labels(skeleton)
     root = labels.parts[skeleton.root]
-    if labels.has_many_legs() or (root is not None and root.kind in (*_ARM, *FINGERS)):
+    if labels.has_many_legs():
         return None
+    if root is not None and root.kind in (*_ARM, *FINGERS):
+        return body_of_hands(skeleton)
     arms, arm_word = labels.arms()
     legs = labels.limbs(_LEG)
     trunk = labels.trunk(arms, legs)

@@ -15,6 +15,7 @@ from devices.errors import InputError
 from runtime.driving.body.bearing import Bearing, low_bearing, room_below
 from runtime.driving.body.body_parts import TwoBodies, body_parts
 from runtime.driving.body.footing import Footing, FootingState
+from runtime.driving.body.held_hands import HeldHands, are_held
 from runtime.driving.body.joint_turns import JointTurns
 from runtime.driving.body.long_arms import LongArms
 from runtime.driving.body.many_legs import ManyLegs
@@ -128,6 +129,7 @@ class BodyDriver:
         self._left = np.array([np.cos(bodies.facing), 0.0, -np.sin(bodies.facing)])
         self._footing = Footing(bodies, parts, vertices, owner)
         self._ends = _ends(bodies)
+        self._held_hands = HeldHands(bodies) if are_held(bodies) else None
         self._rearing = Rearing(bodies)
         self._long_arms = LongArms(bodies.tree, vertices, owner, parts.arms, parts.legs)
         self._at_rest = Targets(skeleton.skinned(skeleton.rest_nodes), nodes=skeleton.rest_nodes)
@@ -172,6 +174,8 @@ class BodyDriver:
         heading = pose.heading if self._goes_along else rest.heading
         joints = turned(pose.seen, self._facing - heading, pose.hips)
         self._ends.steady(joints, pose.time)
+        if self._held_hands is not None:
+            self._held_hands.reach_from_shoulders(joints)
         self._trunk = trunk_turns(joints, self._parts.trunk, self._upright, self._trunk)
         rotations, positions = np.empty((len(rig.order), 4)), np.empty((len(rig.order), 3))
         own = self._joint_turns.turns(pose, heading)

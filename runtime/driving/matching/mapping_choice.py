@@ -19,6 +19,7 @@ from solvers.retarget.match_hysteresis import MatchHysteresis
 from solvers.retarget.source_limbs import SimplifiedSource
 
 CANDIDATES = 20  # matches that can be cycled through
+_MIRRORED = np.diag([-1.0, 1.0, 1.0])
 
 Array = NDArray[np.float64]
 
@@ -78,12 +79,16 @@ class MappingChoice:
             )
         return self._mapping_of(match)
 
-    def best_of(self, states: Sequence[Rest], view: Array) -> tuple[Mapping, Rest, MatchHysteresis]:
+    def best_of(
+        self, states: Sequence[Rest], view: Array, of_anatomy: Mapping | None = None
+    ) -> tuple[Mapping, Rest, MatchHysteresis]:
         """Return the rest state that is most like the puppet, its mapping and its hysteresis.
 
         Args:
             states: at least one.
             view: (3, 3) rotation from the stage to the camera.
+            of_anatomy: a mapping in place of matches; a limb may then point to the other side of
+                the screen, as one that is driven by the performer's limb of the other side does.
 
         Raises:
             InputError: there is no match of the rank that was chosen.
@@ -91,9 +96,10 @@ class MappingChoice:
         choices = []
         for state in states:  # each by itself: no state waits for the one before
             hysteresis = MatchHysteresis(self._choices.rank - 1)
-            mapping = self.of_pose(hysteresis, state.positions, 0.0, view)
+            mapping = of_anatomy or self.of_pose(hysteresis, state.positions, 0.0, view)
             choices.append((mapping, state, hysteresis))
-        worths = [self._worth(mapping, state, view) for mapping, state, _ in choices]
+        seen = (STRAIGHT_ON,) if of_anatomy is None else (STRAIGHT_ON, _MIRRORED)
+        worths = [self._worth(mapping, state, view, seen) for mapping, state, _ in choices]
         return choices[int(np.argmax(worths))]
 
     def _mapping_of(self, match: Match) -> Mapping:
@@ -110,12 +116,18 @@ class MappingChoice:
                 drives.append(Drive(source, target, self._choices.flip))
         return Mapping(tuple(drives), match.score)
 
-    def _worth(self, mapping: Mapping, rest: Rest, view: Array) -> float:
-        """How well a rest state suits: the match's score plus the likeness of the limbs' shapes."""
+    def _worth(self, mapping: Mapping, rest: Rest, view: Array, seen: Sequence[Array]) -> float:
+        """How well a rest state suits: the match's score plus the likeness of the limbs' shapes.
+
+        Of several views of the performer each limb takes the one in which it is most alike.
+        """
         nodes = self._puppet.bound_skeleton.tree.positions
         shapes = sum(
-            shape_likeness(
-                rest.positions[list(drive.source)], nodes[list(drive.target)], STRAIGHT_ON, view
+            max(
+                shape_likeness(
+                    rest.positions[list(drive.source)], nodes[list(drive.target)], own, view
+                )
+                for own in seen
             )
             for drive in mapping.drives
         )

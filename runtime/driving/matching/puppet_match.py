@@ -14,6 +14,7 @@ from runtime.driving.choices import Candidate, Choices
 from runtime.driving.driver import DrivenPart, Driver, MappedDriver
 from runtime.driving.drivers import DriverFactory, best_driver, matched_driver
 from runtime.driving.mapping import Mapping
+from runtime.driving.matching.hand_mapping import mapping_of_hands
 from runtime.driving.matching.mapping_choice import MappingChoice
 from runtime.driving.pairing import Pairing
 from runtime.driving.performer import Performer, Pose, Rest
@@ -88,6 +89,7 @@ class PuppetMatch:
         self._hysteresis = MatchHysteresis(choices.rank - 1)
         self._make_usual = make_driver
         self._matched = self._drives_matched = False
+        self._of_hands = mapping_of_hands(self._pairing()) if make_driver is best_driver else None
         self.matching = True
         self._driver = self._make(make_driver)
         self._proposal: Driver | None = None
@@ -125,7 +127,7 @@ class PuppetMatch:
     @property
     def candidate(self) -> Candidate | None:
         """The match that is shown; None where the anatomy chooses, or no pose was struck."""
-        if not isinstance(self._shown, MappedDriver) or not self.mapping.drives:
+        if not isinstance(self._shown, MappedDriver) or not self.mapping.drives or self._of_anatomy:
             return None
         rank, count = self._hysteresis.place
         return Candidate(rank, count, self.mapping.score)
@@ -172,7 +174,9 @@ class PuppetMatch:
         if not isinstance(shown, MappedDriver):
             return False
         before = shown.mapping.drives
-        mapping = self._mapping_choice.of_pose(self._hysteresis, positions, time, view)
+        mapping = self._of_anatomy
+        if mapping is None:
+            mapping = self._mapping_choice.of_pose(self._hysteresis, positions, time, view)
         shown.show(mapping, view)
         return mapping.drives != before
 
@@ -227,7 +231,9 @@ class PuppetMatch:
         """
         self._clip, rest = clip, states[0]
         if isinstance(self._driver, MappedDriver):
-            mapping, rest, self._hysteresis = self._mapping_choice.best_of(states, view)
+            mapping, rest, self._hysteresis = self._mapping_choice.best_of(
+                states, view, self._of_anatomy
+            )
             self._driver.show(mapping, view)
         self.perform(rest, view)
 
@@ -263,7 +269,7 @@ class PuppetMatch:
         Where the anatomy had chosen, the first step shows the best match: the user's choice beats
         both. A puppet that performs goes on until what is shown is accepted.
         """
-        if self._make_driver is best_driver and not self.mapping.drives:
+        if self._make_driver is best_driver and (self._of_anatomy or not self.mapping.drives):
             self._matched = True
             self._look_again(view)
             return
@@ -280,7 +286,7 @@ class PuppetMatch:
     def _look_again(self, view: Array) -> None:
         """Look for a match with a new driver, which shows what is shown now, if anything is."""
         shown, mapping = self._make(self._make_driver), self.mapping
-        if isinstance(shown, MappedDriver) and mapping.drives:
+        if isinstance(shown, MappedDriver) and mapping.drives and mapping is not self._of_hands:
             shown.show(mapping, view)
         self.matching = True
         if self.rest is None:
@@ -325,21 +331,28 @@ class PuppetMatch:
         self._make_usual, self._matched = make_driver, False
         self._drive_with(driver)
 
-    def _make(self, make_driver: DriverFactory) -> Driver:
-        puppet = self.puppet
-        driver = make_driver(
-            Pairing(
-                self._performer.skeleton,
-                tuple(self._performer.joints),
-                puppet.character,
-                puppet.bound_skeleton,
-                puppet.surface,
-                self._by_hand,
-            )
+    @property
+    def _of_anatomy(self) -> Mapping | None:
+        """What hands drive, where neither the user chose a mapping nor stepped to a match."""
+        chosen = self._by_hand is not None or self._make_driver is not best_driver
+        return None if chosen else self._of_hands
+
+    def _pairing(self) -> Pairing:
+        puppet, performer = self.puppet, self._performer
+        return Pairing(
+            performer.skeleton,
+            tuple(performer.joints),
+            puppet.character,
+            puppet.bound_skeleton,
+            puppet.surface,
+            self._by_hand,
         )
+
+    def _make(self, make_driver: DriverFactory) -> Driver:
+        driver = make_driver(self._pairing())
         if driver.needs.surface:
             raise InputError(
-                f"the driver of {puppet.character.name} needs a surface of the performer, and this "
-                "source gives joints only: choose a driver that follows a skeleton"
+                f"the driver of {self.puppet.character.name} needs a surface of the performer, and "
+                "this source gives joints only: choose a driver that follows a skeleton"
             )
         return driver

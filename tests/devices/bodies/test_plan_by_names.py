@@ -102,7 +102,7 @@ def test_an_insect_has_no_plan(middle: str) -> None:
     assert plan_of(skeleton_of(without)).arm_word == "foreleg"
 
 
-def test_hands_and_arms_alone_have_no_plan() -> None:
+def test_a_hand_and_an_arm_alone_have_no_plan() -> None:
     fingers = ("thumb", "index", "middle", "ring", "pinky")
     hand = Rig(("palm index_mcp", *(f"palm {f}_mcp {f}_pip {f}_tip" for f in fingers)), *[""] * 4)
     assert plan_by_names(skeleton_of(hand)) is None
@@ -235,9 +235,12 @@ def test_all_shared_recordings_of_people_have_a_whole_plan_with_the_left_at_thei
             assert rest[pair[Side.LEFT].upper[0], 0] > rest[pair[Side.RIGHT].upper[0], 0], path.stem
 
 
-@pytest.mark.parametrize("file", ["leap_view_v1/sample.ldj", "leapjs_playback/three-claps.json.lz"])
-def test_shared_recordings_of_hands_have_no_plan(shared: Path, file: str) -> None:
-    assert plan_by_names(read_recording(shared / "leap" / file).skeleton) is None
+@pytest.mark.parametrize(
+    ("file", "arms"), [("leap_view_v1/sample.ldj", 0), ("leapjs_playback/three-claps.json.lz", 2)]
+)
+def test_two_hands_of_shared_recordings_are_arms(shared: Path, file: str, arms: int) -> None:
+    plan = plan_by_names(read_recording(shared / "leap" / file).skeleton)
+    assert len(plan.arms if plan else ()) == arms
 
 
 WORDS = st.sampled_from(
