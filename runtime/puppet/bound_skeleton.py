@@ -18,6 +18,7 @@ from runtime.driving.targets import (
     SkinnedTargets,
     Targets,
 )
+from runtime.puppet.part_radii import part_radii
 from solvers.deform.handles import HARD, group_targets, stretched_turns
 from solvers.deform.skinning import SkinnedSurface
 from solvers.deform.stiff_segments import StiffSegments, find_stiff_segments
@@ -127,10 +128,11 @@ class BoundSkeleton:
             if is_rigid(weights):
                 return skin_of_rigid_weights(proxy.vertices, proxy.faces, weights)
             return skin_of_weights(weights)
-        tree = character.skeleton.tree
+        tree, radii = character.skeleton.tree, None
         if character.plan is not None:
             tree = tree.rerooted(character.plan.hips)
-        return skin_of_heat(proxy.vertices, proxy.faces, tree.parents, tree.positions)
+            radii = part_radii(proxy.vertices, proxy.faces, tree, character.plan)
+        return skin_of_heat(proxy.vertices, proxy.faces, tree.parents, tree.positions, radii)
 
     @cached_property
     def _skinned_surface(self) -> SkinnedSurface:

@@ -2,7 +2,9 @@
 
 Source: Baran and Popovic 2007, Automatic rigging and animation of 3D characters, section 4. Each
 vertex takes heat from the nearest bone that it sees inside the body, the more the nearer the bone
-is, and heat spreads along the surface. The share of a bone in a vertex is its temperature when that
+is, and heat spreads along the surface. Where the parts of the body are known, nearness is measured
+in their radii (not in the paper), or a thick trunk would lose its flanks to the beginnings of thin
+limbs, which lie inside it. The share of a bone in a vertex is its temperature when that
 bone alone is hot. The heat of an arm cannot jump to the belly beside it, nor that of a bone which
 sticks out of the surface: it lies in front of the skin that it could heat.
 """
@@ -10,7 +12,7 @@ sticks out of the surface: it lies in front of the skin that it could heat.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -42,11 +44,13 @@ class _Bones:
     Attributes:
         starts, ends: (B, 3) positions of their ends.
         owners: (B,) the node with which each turns: the one at which it starts.
+        radii: (B,) in which the distances to it are measured.
     """
 
     starts: Floats
     ends: Floats
     owners: Ints
+    radii: Floats
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -66,7 +70,13 @@ class _Sight:
     nearest_distances: Floats
 
 
-def skin_of_heat(vertices: Floats, faces: Ints, parents: Ints, positions: Floats) -> Skin:
+def skin_of_heat(
+    vertices: Floats,
+    faces: Ints,
+    parents: Ints,
+    positions: Floats,
+    radii: Floats | None = None,
+) -> Skin:
     """Return the skin by which a surface follows the nodes of the skeleton within it.
 
     A bone belongs to the node at which it starts, whose rotation turns what lies beyond. A small
@@ -77,17 +87,18 @@ def skin_of_heat(vertices: Floats, faces: Ints, parents: Ints, positions: Floats
         faces: (F, 3) triangles, any: boundaries, non-manifold edges, several parts.
         parents: (K,) parent of each node, -1 at the root.
         positions: (K, 3) rest positions of the nodes.
+        radii: (K,) how thick the body is around the bone that ends at each node, in any unit; None
+            where this is unknown: equally thick.
     """
-    bones = _bones_of(parents, positions)
+    bones = _bones_of(parents, positions, np.ones(len(parents)) if radii is None else radii)
     owners, owner_of = np.unique(bones.owners, return_inverse=True)
     if len(owners) == 1:
         return Skin(np.full((len(vertices), 1), owners[0]), np.ones((len(vertices), 1)))
     extent = float(np.ptp(vertices, axis=0).max()) or 1.0
     points = np.ascontiguousarray(vertices / extent)
     part_of = _parts(faces, len(points))
-    sight = _look(
-        points, faces, part_of, _Bones(bones.starts / extent, bones.ends / extent, bones.owners)
-    )
+    scaled = replace(bones, starts=bones.starts / extent, ends=bones.ends / extent)
+    sight = _look(points, faces, part_of, scaled)
     heat, bone_of = _heat(points, faces, part_of, sight)
     sources = np.zeros((len(points), len(owners)))
     hot = bone_of >= 0
@@ -138,7 +149,7 @@ def _on_nodes(spread: Floats, used: Ints, count: int) -> sp.csr_array:
     return sp.csr_array((spread[row, column], (row, used[column])), shape=(len(spread), count))
 
 
-def _bones_of(parents: Ints, positions: Floats) -> _Bones:
+def _bones_of(parents: Ints, positions: Floats, radii: Floats) -> _Bones:
     """The bones of a tree; the root alone where there is none of any length."""
     ends = np.flatnonzero(parents >= 0)
     starts = parents[ends]
@@ -146,7 +157,7 @@ def _bones_of(parents: Ints, positions: Floats) -> _Bones:
     ends, starts = ends[long], starts[long]
     if not len(ends):
         ends = starts = np.flatnonzero(parents < 0)
-    return _Bones(positions[starts], positions[ends], starts.astype(np.int64))
+    return _Bones(positions[starts], positions[ends], starts.astype(np.int64), radii[ends])
 
 
 def _parts(faces: Ints, count: int) -> Ints:
@@ -194,9 +205,8 @@ def _look(points: Floats, faces: Ints, part_of: Ints, bones: _Bones) -> _Sight:
     nearest = np.empty(count, dtype=np.int64)
     far = np.full((count, 2), np.inf)
     outward = _outward(points, faces, part_of)
-    _find_bones(
-        box_tree(points, faces), part_of, outward, bones.starts, bones.ends, seen, nearest, far
-    )
+    places = bones.starts, bones.ends, bones.radii
+    _find_bones(box_tree(points, faces), part_of, outward, places, seen, nearest, far)
     return _Sight(seen, far[:, 0], nearest, far[:, 1])
 
 
@@ -222,22 +232,22 @@ def _find_bones(
     tree: BoxTree,
     part_of: Ints,
     outward: Floats,
-    starts: Floats,
-    ends: Floats,
+    bones: tuple[Floats, Floats, Floats],
     seen: Ints,
     nearest: Ints,
     far: Floats,
 ) -> None:
     """Fill in a `_Sight`; far (N, 2) are the distances to seen bones and to the nearest."""
+    starts, ends, radii = bones
     points = np.empty((len(starts), 3))
     squared = np.empty(len(starts))
     waiting = np.empty(ROOM, dtype=np.int64)
     for v in range(len(seen)):
         x = (tree.vertices[v, 0], tree.vertices[v, 1], tree.vertices[v, 2])
         for b in range(len(starts)):
-            squared[b] = _nearest_point(x, starts[b], ends[b], points[b])
+            squared[b] = _nearest_point(x, starts[b], ends[b], points[b]) / (radii[b] * radii[b])
         best = _least(squared)
-        nearest[v], far[v, 1] = best, math.sqrt(squared[best])
+        nearest[v], far[v, 1] = best, radii[best] * math.sqrt(squared[best])
         most, found = np.inf, 0
         for _ in range(min(_TRIED, len(starts))):
             b = _least(squared)
@@ -248,11 +258,11 @@ def _find_bones(
             ahead = 0.0
             for axis in range(3):
                 ahead += outward[v, axis] * (points[b, axis] - x[axis])
-            if ahead != 0.0 and ahead > -_GRAZES * math.sqrt(d2):
+            if ahead != 0.0 and ahead > -_GRAZES * radii[b] * math.sqrt(d2):
                 continue
             if not is_blocked(tree, part_of, v, points[b], waiting):
                 if found == 0:
-                    far[v, 0] = math.sqrt(d2)
+                    far[v, 0] = radii[b] * math.sqrt(d2)
                     most = d2 * (1.0 + _TIE) ** 2
                 seen[v, found] = b
                 found += 1

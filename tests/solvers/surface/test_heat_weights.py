@@ -153,3 +153,18 @@ def test_rigid_parts_that_are_apart_stay_rigid() -> None:
     faces = np.concatenate([FACES, FACES + len(VERTICES)])
     weights = dense(skin_of_rigid_weights(both, faces, one_node(owner, 3)), 3)
     np.testing.assert_allclose(weights[np.arange(len(owner)), owner], 1.0)
+
+
+def test_a_thick_trunk_keeps_its_flank_from_a_thin_limb_that_begins_inside_it() -> None:
+    """A bone from the middle of a bar to its side: the nearest one, but a thin one."""
+    nodes = np.array([[0.1, 0.0, 0.0], [2.0, 0.0, 0.0], [3.9, 0.0, 0.0], [2.0, 0.15, 0.0],
+                      [2.0, 0.3, 0.0]])  # fmt: skip
+    parents = np.array([-1, 0, 1, 1, 3])
+    alike = dense(skin_of_heat(VERTICES, FACES, parents, nodes), 5)
+    radii = np.array([1.0, 1.0, 1.0, 0.2, 0.2])
+    thin = dense(skin_of_heat(VERTICES, FACES, parents, nodes, radii), 5)
+    beside = (abs(VERTICES[:, 0] - 2.0) < 0.3) & (VERTICES[:, 1] > 0.0)
+    assert alike[beside, 3].max() > 0.3
+    assert thin[beside, 3].max() < 0.5 * alike[beside, 3].max()
+    every = dense(skin_of_heat(VERTICES, FACES, parents, nodes, np.full(5, 3.0)), 5)
+    np.testing.assert_allclose(every, alike, atol=1e-6)
