@@ -16,6 +16,10 @@ MOST_POSES = 20_000_000
 """Frames times joints: an hour and a half of one body of 59 joints at 60 Hz; 1 GB while it is read.
 """
 
+MOST_JOINTS = 10_000
+FARTHEST_REST = 1000.0
+"""[m] from the origin of a joint at rest."""
+
 
 def check_recordable(path: Path) -> None:
     """Check that a recording can be at `path`: a file, or nothing yet.
@@ -52,8 +56,15 @@ def plausible(recording: Recording) -> Recording:
     """The recording without places that nothing can be at; a note says how many there were.
 
     Raises:
-        InputError: its times are beyond `MOST_SECONDS`, or not in order.
+        InputError: its times are beyond `MOST_SECONDS` or not in order, or its skeleton is one that
+            no recording of ours can hold.
     """
+    rest = recording.skeleton.rest_positions
+    if len(rest) > MOST_JOINTS or not (np.abs(rest) <= FARTHEST_REST).all():
+        raise InputError(
+            f"its skeleton has more than {MOST_JOINTS} joints, or one that rests farther than "
+            f"{FARTHEST_REST:g} m away; state its unit (--unit-input)"
+        )
     if not (np.diff(recording.times) >= 0.0).all() or not recording.seconds <= MOST_SECONDS:
         raise InputError("its times are no seconds; check how it was written")
     far = ~(np.abs(recording.positions) <= FARTHEST).all(axis=2)

@@ -30,6 +30,7 @@ MARK = "# bunraku.skeleton "
 MOST_BYTES = 1 << 30
 MOST_SHEET_BYTES = 128 << 20  # of a file that a spreadsheet saved; none holds more rows
 _DECIMAL_COMMA = re.compile(r"-?\d+,\d+(?:[eE][-+]?\d+)?")
+_LINE_END = re.compile(r"[\r\n]")
 _PLACE = ("x", "y", "z", "confidence")
 _TURN = ("qx", "qy", "qz", "qw")
 
@@ -41,7 +42,7 @@ def write_joint_table(file: TextIO, recording: Recording) -> None:
         file: open for writing, without translation of line ends.
         recording: of any number of performers.
     """
-    names = recording.skeleton.names
+    names = [_LINE_END.sub(" ", name) for name in recording.skeleton.names]
     per_joint = _PLACE if recording.rotations is None else _PLACE + _TURN
     file.write(f"{MARK}{encode_skeleton(recording.skeleton)}\n")
     table = csv.writer(file, lineterminator="\n")

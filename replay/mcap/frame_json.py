@@ -28,14 +28,13 @@ from devices.blend_shapes import checked_blends
 from devices.bounded_json import parse_json
 from devices.errors import InputError
 from devices.skeleton import MOST_SECONDS, Skeleton, SkeletonFrame
+from replay.bounds import FARTHEST_REST, MOST_JOINTS
 from replay.mcap.record_reader import DamagedRecordError
 
 SKELETON_NAME = "bunraku.skeleton"
 SOURCE_NAME = "bunraku.source"
 SKELETON_TOPIC = "/skeleton"
 PERFORMER_TOPIC = "/performer/"
-FARTHEST_REST = 1000.0  # [m]
-MOST_JOINTS = 10_000
 
 _NUMBER = {"type": ["number", "null"]}
 _ROWS = {"type": "array", "items": {"type": "array", "items": _NUMBER}}

@@ -23,7 +23,7 @@ from replay.leap.reader import read_leap
 from replay.mcap.reader import MOST_MEMORY, most_frames
 from replay.mcap.writer import McapWriter
 from replay.mediapipe.text import parse_landmark_text
-from replay.stated import UNSTATED
+from replay.stated import UNSTATED, Stated
 
 ARM = Skeleton(("shoulder", "hand"), np.array([-1, 0]), np.eye(3)[:2])
 MIB = 1 << 20
@@ -155,3 +155,16 @@ def test_two_readers_at_once_leave_the_filter_of_warnings_alone(tmp_path: Path) 
     for thread in threads:
         thread.join()
     assert warnings.filters == before
+
+
+def test_a_skeleton_that_no_recording_of_ours_can_hold_is_refused(tmp_path: Path) -> None:
+    """Else `convert` would write what it cannot read."""
+    path = tmp_path / "far.bvh"
+    path.write_text(
+        "HIERARCHY\nROOT a\n{\nOFFSET 0 0 0\nCHANNELS 3 Xposition Yposition Zposition\n"
+        "JOINT b\n{\nOFFSET 0 5000 0\nCHANNELS 1 Xrotation\n}\n}\n"
+        "MOTION\nFrames: 1\nFrame Time: 0.03\n0 0 0 0\n"
+    )
+    with pytest.raises(InputError, match=r"farther than 1000 m away; state its unit"):
+        read_recording(path, Stated(unit="m"))
+    assert len(read_recording(path, Stated(unit="mm"))) == 1
