@@ -24,7 +24,7 @@ from tests.replay.studio.studio_files import motive_bones, motive_table, mvnx_te
 from tests.runtime.cli.program import BUNRAKU, ENVIRONMENT
 from tests.thorough import THOROUGH
 
-INPUTS = 20_000 if THOROUGH else 5_000
+INPUTS = 20_000 if THOROUGH else 2_000
 
 
 def other_recordings(folder: Path) -> Iterator[Path]:
@@ -71,16 +71,17 @@ PLANTED: dict[str, tuple[Callable[[Path], object], str]] = {
     "file": (lambda folder: (folder / "a").write_text("a"), "for writing"),
     "removal": (lambda folder: (folder / "there").unlink(), "os.remove"),
     "process": (lambda _: subprocess.run(["true"], check=True), "subprocess.Popen"),
-    "memory": (lambda _: len(bytearray(b"a" * (2304 << 20))), "MiB"),
+    "memory": (lambda _: len(b"a" * (1 << 30)), "MiB"),
     "two lines": (lambda _: _refuse("a\nb"), "several lines"),
     "none": (lambda _: _refuse("a"), ""),
 }
 PLANTS = r"""
 import sys
 from pathlib import Path
-from runtime.benchmarks.fuzzing.watch import Watch
+from runtime.benchmarks.fuzzing import watch as watching
 from tests.benchmarks.test_fuzz import PLANTED
-watch = Watch()
+watching.MOST_KIB = 128 << 10
+watch = watching.Watch()
 folder = Path(sys.argv[1])
 with watch.quiet():
     faults = {name: watch.fault(lambda: do(folder)) for name, (do, _) in PLANTED.items()}

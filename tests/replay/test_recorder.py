@@ -25,6 +25,7 @@ from replay.player import EveryFrame, Player
 from replay.recorded_stream import RecordedStream
 from replay.recorder import Recorder
 from runtime.benchmarks.kill import killed_recording
+from tests.full_disk import files_of_at_most, posix_limits
 from tests.waiting import PATIENCE
 
 ARM = Skeleton(("shoulder", "elbow", "hand"), np.array([-1, 0, 1]), np.eye(3))
@@ -214,34 +215,24 @@ def test_a_full_disk_ends_a_recording_with_one_line_and_a_file_that_opens(tmp_pa
         assert np.diff(recording.of(performer).times) == pytest.approx(1 / RATE)
 
 
-FULL_DISK_IN_A_SHOW = """
-import json, resource, sys
-sys.path.insert(0, {root!r})
-from runtime.cli import main
-resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
-sys.exit(main(["replay", sys.argv[1], "--character", "paper", "--headless", "--fast",
-               "--record", sys.argv[2], "--report", sys.argv[3]]))
-"""
+@posix_limits
+def test_a_full_disk_is_told_in_the_running_show_which_goes_on(
+    tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    from runtime.cli import main
 
-
-@pytest.mark.skipif(sys.platform == "win32", reason="limits of a process are POSIX")
-def test_a_full_disk_is_told_in_the_running_show_which_goes_on(tmp_path: Path) -> None:
     played = motion_clip("wave")
     with McapWriter(tmp_path / "in.mcap", played.skeleton) as writer:
         for index, positions in enumerate(played.positions):
             seen = np.ones(len(positions))
             writer.write(SkeletonFrame(index / RATE, positions, None, seen))
     path, report = tmp_path / "a.mcap", tmp_path / "r.json"
-    code = FULL_DISK_IN_A_SHOW.format(root=str(CHECKOUT))
-    done = subprocess.run(
-        [sys.executable, "-c", code, str(tmp_path / "in.mcap"), str(path), str(report)],
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-    )
-    assert done.returncode == 2, done.stderr
-    (line,) = [line for line in done.stderr.splitlines() if "warning" in line]
+    show = ["replay", str(tmp_path / "in.mcap"), "--character", "paper", "--headless", "--fast"]
+    with files_of_at_most(200_000):
+        code = main([*show, "--record", str(path), "--report", str(report)])
+    said = capfd.readouterr().err
+    assert code == 2, said
+    (line,) = [line for line in said.splitlines() if "warning" in line]
     assert f"cannot write {path}: File too large; the recording has stopped" in line
     told = json.loads(report.read_text())
     assert told["frames"] == len(played.positions)

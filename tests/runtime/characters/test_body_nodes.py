@@ -23,6 +23,7 @@ from runtime.show.show import Show
 from solvers.skeleton.limbs import surface_points
 from solvers.skeleton.mirror_plane import MirrorPlane, mirror_planes
 from tests.runtime.capsule_bodies import DOG, PERSON, CapsuleBody, capsule_body
+from tests.thorough import third_of
 
 MIDDLE = MirrorPlane(np.array([1.0, 0.0, 0.0]), 0.0, 0.0)
 
@@ -167,7 +168,7 @@ def test_thighs_without_a_gap_that_voxels_see_have_their_hips_above_the_crotch(
         assert np.linalg.norm(hip - knee) == pytest.approx(np.linalg.norm(knee - ankle), rel=0.6)
 
 
-@pytest.mark.parametrize("name", ["elephant.obj", "cgal_armadillo.off", "cgal_dino.off"])
+@pytest.mark.parametrize("name", third_of(["elephant.obj", "cgal_armadillo.off", "cgal_dino.off"]))
 def test_a_short_trunk_can_bend(shared: Path, name: str) -> None:
     character = load_character(shared / "mesh" / name)
     assert len(character.plan.trunk) == 1

@@ -14,6 +14,7 @@ from runtime.characters.facing import facing_the_audience
 from runtime.characters.open_character import load_character
 from tests.runtime.capsule_bodies import DOG, capsule_body
 from tests.runtime.stick_figures import make_figure
+from tests.thorough import third_of
 
 
 def written(folder: Path, yaw: float) -> Path:
@@ -31,7 +32,7 @@ def heading(character: Character) -> float:
     return float(np.degrees(rest_heading(character.skeleton, character.plan)))
 
 
-@pytest.mark.parametrize(("yaw", "seen"), [(180, 90), (0, 90), (90, 90), (-90, -90)])
+@pytest.mark.parametrize(("yaw", "seen"), third_of([(180, 90), (0, 90), (90, 90), (-90, -90)]))
 def test_a_dog_shows_its_face_or_its_side(tmp_path: Path, yaw: float, seen: float) -> None:
     character = load_character(written(tmp_path, yaw))
     assert heading(character) == pytest.approx(seen, abs=8.0)

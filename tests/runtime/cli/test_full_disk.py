@@ -3,48 +3,28 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from replay.mcap.reader import read_mcap
-from tests.runtime.cli.program import BUNRAKU, ENVIRONMENT, FRAMES, ROOT, SMALL, Run, point_cache
+from tests.full_disk import files_of_at_most, posix_limits
+from tests.runtime.cli.program import BUNRAKU, ENVIRONMENT, FRAMES, SMALL, Run, point_cache
 from tests.waiting import PATIENCE
 
-FULL = """
-import resource, sys
-from runtime.cli import main
-resource.setrlimit(resource.RLIMIT_FSIZE, ({most}, {most}))
-sys.exit(main(sys.argv[1:]))
-"""
-pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="limits of a process are POSIX")
-
-
-def _on_a_disk(most: int, *arguments: object, folder: Path) -> subprocess.CompletedProcess[str]:
-    """Run the program where no file can be larger than `most` [bytes]."""
-    return subprocess.run(
-        [sys.executable, "-c", FULL.format(most=most), *map(str, arguments)],
-        cwd=folder,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-    )
+pytestmark = posix_limits
 
 
 def test_files_that_do_not_fit_are_named_and_the_others_are_whole(
-    recording: Path, tmp_path: Path
+    recording: Path, tmp_path: Path, bunraku: Run
 ) -> None:
-    done = _on_a_disk(
-        400_000, "replay", recording, "--character", "mannequin", *SMALL,
-        "--cache", "c.pc2", "--export", "e.glb", "--frames", "p", "--report", "r.json",
-        folder=tmp_path,
-    )  # fmt: skip
+    with files_of_at_most(400_000):
+        done = bunraku(
+            "replay", recording, "--character", "mannequin", *SMALL,
+            "--cache", "c.pc2", "--export", "e.glb", "--frames", "p", "--report", "r.json",
+        )  # fmt: skip
     assert done.returncode == 2, done.stderr
     *warnings, error = done.stderr.splitlines()
     assert error == "bunraku: error: not kept whole: e.glb, c.pc2"
@@ -63,13 +43,13 @@ def test_files_that_do_not_fit_are_named_and_the_others_are_whole(
     assert not (tmp_path / "e.glb").exists()
 
 
-def test_a_show_outlives_each_of_its_files(recording: Path, tmp_path: Path) -> None:
+def test_a_show_outlives_each_of_its_files(recording: Path, tmp_path: Path, bunraku: Run) -> None:
     pytest.importorskip("av")
-    done = _on_a_disk(
-        9000, "replay", recording, "--character", "paper", *SMALL,
-        "--video", "v.mp4", "--frames", "p", "--record", "t.mcap",
-        folder=tmp_path,
-    )  # fmt: skip
+    with files_of_at_most(9000):
+        done = bunraku(
+            "replay", recording, "--character", "paper", *SMALL,
+            "--video", "v.mp4", "--frames", "p", "--record", "t.mcap",
+        )  # fmt: skip
     assert done.returncode == 2
     *warnings, error = done.stderr.splitlines()
     assert error == "bunraku: error: not kept whole: v.mp4, p, t.mcap"

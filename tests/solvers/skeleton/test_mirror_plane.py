@@ -12,6 +12,7 @@ from solvers.skeleton.mirror_plane import SYMMETRIC, MirrorPlane, mirror_planes
 from solvers.skeleton.rejoined import rejoined
 from solvers.skeleton.tree import Tree
 from tests.runtime.capsule_bodies import DOG, MOUSE, CapsuleBody, capsule_body
+from tests.thorough import combined
 
 ACROSS = MirrorPlane(np.array([1.0, 0.0, 0.0]), 0.0, 0.0)
 
@@ -20,10 +21,12 @@ def planes(body: CapsuleBody, count: int = 3) -> list[MirrorPlane]:
     return mirror_planes(surface_points(body.vertices, body.faces), count)
 
 
-@pytest.mark.parametrize("scale", [1e-3, 1.0, 1e3])
-@pytest.mark.parametrize("yaw", [0.0, 20.0, 90.0, 130.0])
-@pytest.mark.parametrize("branches", [MOUSE, DOG], ids=["mouse", "dog"])
-def test_the_plane_of_a_turned_body_is_found(branches, yaw: float, scale: float) -> None:
+@pytest.mark.parametrize(
+    ("name", "yaw", "scale"),
+    combined(["mouse", "dog"], [0.0, 20.0, 90.0, 130.0], [1e-3, 1.0, 1e3]),
+)
+def test_the_plane_of_a_turned_body_is_found(name: str, yaw: float, scale: float) -> None:
+    branches = {"mouse": MOUSE, "dog": DOG}[name]
     rotation = Rotation.from_euler("y", yaw, degrees=True).as_matrix()
     shift = np.array([2.0, 1.0, -3.0])
     body = capsule_body(branches).moved(scale * rotation, scale * shift)

@@ -18,6 +18,7 @@ from solvers.skeleton.curve_tree import MOST_NODES
 from solvers.skeleton.skeletonize import extract_skeleton
 from solvers.skeleton.tree import Tree
 from solvers.surface.voxel_solid import surface_samples, voxel_solid
+from tests.thorough import third_of
 
 pytest.importorskip("pygel3d")
 pytest.importorskip("fast_simplification")
@@ -254,16 +255,18 @@ def test_a_box_without_a_floor_is_solid_and_closed() -> None:
 
 @pytest.mark.parametrize(
     ("name", "limbs", "leaves"),
-    [
-        ("mesh/cgal_man.off", 5, 17),  # fingers, toes and features of the face are leaves
-        ("mesh/cow.off", 6, 11),  # four legs, tail, head with ears and horns
-        ("mesh/camel_b.obj", 6, 14),  # knees that touch in a point
-        ("mesh/woody_planar.obj", 5, 5),
-        ("mesh/octopus-low.mesh", 8, 8),
-        ("mesh/decimated-knight.off", 5, 9),
-        ("mesh/cat_dt/cat_reference.obj", 6, 8),
-        ("mesh/cgal_cactus.off", 4, 4),
-    ],
+    third_of(
+        [
+            ("mesh/cgal_man.off", 5, 17),  # fingers, toes and features of the face are leaves
+            ("mesh/cow.off", 6, 11),  # four legs, tail, head with ears and horns
+            ("mesh/camel_b.obj", 6, 14),  # knees that touch in a point
+            ("mesh/woody_planar.obj", 5, 5),
+            ("mesh/octopus-low.mesh", 8, 8),
+            ("mesh/decimated-knight.off", 5, 9),
+            ("mesh/cat_dt/cat_reference.obj", 6, 8),
+            ("mesh/cgal_cactus.off", 4, 4),
+        ]
+    ),
 )
 def test_real_characters_have_their_limbs(shared: Path, name: str, limbs: int, leaves: int) -> None:
     mesh = read_mesh_file(shared / name)
@@ -272,7 +275,9 @@ def test_real_characters_have_their_limbs(shared: Path, name: str, limbs: int, l
     assert len(tree.leaves) <= leaves
 
 
-@pytest.mark.parametrize("name", ["cgal_elephant-with-holes.off", "truck.obj", "teapot.obj"])
+@pytest.mark.parametrize(
+    "name", third_of(["cgal_elephant-with-holes.off", "truck.obj", "teapot.obj"])
+)
 def test_broken_real_surfaces_have_few_limbs_inside(shared: Path, name: str) -> None:
     mesh = read_mesh_file(shared / "mesh" / "bad" / name)
     tree = _skeleton((mesh.vertices, mesh.faces))

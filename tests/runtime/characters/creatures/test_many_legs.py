@@ -15,6 +15,7 @@ from runtime.characters.open_character import load_character
 from solvers.skeleton.limbs import surface_points
 from solvers.skeleton.mirror_plane import mirror_planes
 from tests.runtime.capsule_bodies import DOG, PERSON, SPIDER, CapsuleBody, both, capsule_body
+from tests.thorough import combined
 
 ABDOMEN = {"abdomen": ("hips", [(0, 0.32, -0.3), (0, 0.35, -0.7)], 0.18)}
 FEELERS = both("feeler", "trunk", [(0.1, 0.4, 0.35), (0.2, 0.5, 0.6)], 0.015)
@@ -40,13 +41,16 @@ def legs_of(body: CapsuleBody, plan: BodyPlan, side: Side) -> list[set[str]]:
     return [body.names(pair[side].chain) for pair in pairs]
 
 
-@pytest.mark.parametrize("yaw", [0, 40, 90, 200])
-@pytest.mark.parametrize(
-    ("branches", "pairs"),
-    [({**SPIDER, **ABDOMEN}, 4), ({**SPIDER, **FEELERS}, 4), (ANT, 3)],
-    ids=["abdomen", "feelers", "ant"],
-)
-def test_legs_are_paired_from_the_front_to_the_hind(branches, pairs: int, yaw: float) -> None:
+BODIES = {
+    "abdomen": ({**SPIDER, **ABDOMEN}, 4),
+    "feelers": ({**SPIDER, **FEELERS}, 4),
+    "ant": (ANT, 3),
+}
+
+
+@pytest.mark.parametrize(("name", "yaw"), combined(list(BODIES), [0, 40, 90, 200]))
+def test_legs_are_paired_from_the_front_to_the_hind(name: str, yaw: float) -> None:
+    branches, pairs = BODIES[name]
     turn = Rotation.from_euler("y", yaw, degrees=True).as_matrix()
     body = capsule_body(branches).moved(turn, np.array([1.0, 0.2, -3.0]))
     plan = planned(body)
