@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TypeGuard
 
@@ -33,6 +34,7 @@ def perform(
     read: Sequence[tuple[str, Path]] = (),
     session: SessionStore | None = None,
     began: Callable[[Show], None] = lambda _: None,
+    kiosk: float | None = None,
 ) -> int:
     """Perform the show that the options ask for; the exit code.
 
@@ -43,12 +45,13 @@ def perform(
         read: files that are read and must not be written, each with the name of its option.
         session: where takes are kept and played from.
         began: is called once, after the first frame was performed.
+        kiosk: of `ShowSettings`.
 
     Raises:
         InputError: anything that a user can put right; at the end, also for files that are not
             whole.
     """
-    settings = show_settings(options, origin)
+    settings = replace(show_settings(options, origin), kiosk=kiosk)
     names = [Path(name).stem for name in options.character]
     check_outputs(
         settings, names, [*read, *(("--character", Path(name)) for name in options.character)]

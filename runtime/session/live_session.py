@@ -12,6 +12,7 @@ from runtime.puppet.puppet import Puppet
 from runtime.session import edits, unfinished
 from runtime.session.actor_layers import ActorLayers, Cue
 from runtime.session.document import Session, Take, next_id
+from runtime.session.kiosk import Kiosk
 from runtime.session.performance import Performance
 from runtime.session.store import SessionStore
 from runtime.session.transport import Mode, Transport
@@ -24,13 +25,15 @@ class StagedActor:
     Attributes:
         actor: its id in the session.
         puppet: on the stage.
-        performs: whether a performer moves it now.
+        seen: whether its performer is in view.
+        performs: whether its performer moves it now.
         named: the nodes that its driver names as driven.
         parts: what drives what, a line each.
     """
 
     actor: int
     puppet: Puppet
+    seen: Callable[[], bool]
     performs: Callable[[], bool]
     named: Callable[[], frozenset[int]]
     parts: Callable[[], Sequence[str]]
@@ -49,6 +52,7 @@ class LiveSession:
     Attributes:
         store: as given.
         transport: where the session's time stands.
+        kiosk: plays the session while nobody is seen; None where somebody operates the show.
     """
 
     def __init__(
@@ -62,6 +66,7 @@ class LiveSession:
     ) -> None:
         self.store = store
         self.transport = Transport(lambda: self.session.duration)
+        self.kiosk: Kiosk | None = None
         self._staged, self._armed = staged, armed
         self._tell, self._warn = tell, warn
         self._time = float("nan")
@@ -74,6 +79,11 @@ class LiveSession:
     def session(self) -> Session:
         """The version that counts now."""
         return self.store.session
+
+    @property
+    def goes_on(self) -> bool:
+        """Whether the show goes on where no performer sends a frame."""
+        return self.kiosk is not None or self.transport.mode is not Mode.REHEARSING
 
     @property
     def recordings(self) -> Path:
@@ -236,6 +246,8 @@ class LiveSession:
             if time != self._time:
                 self._time = time
                 self.transport.advance(time)
+                if self.kiosk is not None:
+                    self.kiosk.follow(time, seen=any(each.seen() for each in self._staged))
             mode = self.transport.mode
             live = mode in (Mode.REHEARSING, Mode.RECORDING)
             return Cue(

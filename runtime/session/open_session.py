@@ -72,13 +72,18 @@ def _actor(number: int, puppet: Puppet, name: str, drive: str) -> Actor:
 
 
 def _staged(actor: int, act: Act, puppet: Puppet, match: PuppetMatch) -> StagedActor:
+    def seen() -> bool:
+        return act.pose is not None and not act.pose.filled.all()
+
     def performs() -> bool:
-        return match.rest is not None and act.pose is not None and not act.pose.filled.all()
+        return match.rest is not None and seen()
 
     def named() -> frozenset[int]:
         return frozenset(node for part in match.parts for node in part.target)
 
-    return StagedActor(actor, puppet, performs, named, lambda: [str(part) for part in match.parts])
+    return StagedActor(
+        actor, puppet, seen, performs, named, lambda: [str(part) for part in match.parts]
+    )
 
 
 def _check_actors(path: Path, session: Session, puppets: Sequence[Puppet], drive: str) -> None:

@@ -206,6 +206,8 @@ class ShowSettings:
         files: the files to write.
         senders: what to send to other programs.
         remote: remote control by OSC, or None.
+        kiosk: [s] after the last performer has left until the session plays again and again; None
+            where somebody operates the show.
         origin: where the stream comes from, for the head of recordings: an address or a file name.
 
     Raises:
@@ -226,9 +228,12 @@ class ShowSettings:
     files: FileSettings = field(default_factory=FileSettings)
     senders: SenderSettings = field(default_factory=SenderSettings)
     remote: RemoteSettings | None = None
+    kiosk: float | None = None
     origin: str = ""
 
     def __post_init__(self) -> None:
+        if self.kiosk is not None:
+            _check_range(self, "kiosk", 0.0, math.inf)
         size: object = self.size
         if not isinstance(size, tuple) or len(size) != 2 or not all(map(_is_side, size)):
             raise _refusal(self, "size", f"two whole numbers from {LEAST_SIDE} to {MOST_SIDE}")

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from runtime.cli.live import for_performers, is_camera
-from runtime.cli.options.arguments import seconds
+from runtime.cli.options.arguments import positive, seconds
 from runtime.cli.options.input_options import add_input_options, stated
 from runtime.cli.options.show_options import add_character_option, add_show_options
 
@@ -42,6 +42,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=0.0,
         metavar="S",
         help="let the time stand at this second of the session",
+    )
+    parser.add_argument(
+        "--kiosk",
+        type=positive,
+        metavar="S",
+        help="nobody operates the show: it plays S seconds after the last performer has left, "
+        "and stops for the next one; full screen, without the panel",
     )
     add_character_option(parser, required=False)
     add_input_options(parser)

@@ -14,7 +14,7 @@ from replay.recording import Recording
 from runtime.characters.character import Character
 from runtime.conditioning.switches import asked_for, for_live, for_recording
 from runtime.control.remote import PORT, Remote
-from runtime.control.show_controls import ShowControls
+from runtime.control.show_controls import ShowControls, View
 from runtime.driving.drivers import LIMB_BY_LIMB, DriverFactory
 from runtime.driving.mapping import read_mapping
 from runtime.driving.match_session import MatchSession
@@ -25,11 +25,11 @@ from runtime.output.report.report import Report
 from runtime.puppet.deformable_surface import Elasticity
 from runtime.puppet.puppet import Puppet
 from runtime.render.camera import front_camera
+from runtime.session.kiosk import Kiosk
 from runtime.session.live_session import LiveSession
 from runtime.session.open_session import open_session
 from runtime.session.session_takes import record_into
 from runtime.session.store import SessionStore
-from runtime.session.transport import Mode
 from runtime.show.act_group import Act, ActGroup
 from runtime.show.interrupts import interrupts_deferred
 from runtime.show.loop import FrameLoop
@@ -280,6 +280,7 @@ class OpenedShow:
             leave_asked=SecondPress(self._clock),
             playback=playback_of(self._stream) if session is None else session.transport,
             scene=self.scene,
+            view=View() if self._settings.kiosk is None else View(panel=False, full_screen=True),
         )
 
     def _open_session(self, matching: ActGroup) -> LiveSession | None:
@@ -287,7 +288,9 @@ class OpenedShow:
             return None
         drive, tell, warn = self._settings.match.driver, self._tell, self._warn
         session = open_session(self._store, self.acts, matching, drive, tell=tell, warn=warn)
-        self.loop.goes_on = lambda: session.transport.mode is not Mode.REHEARSING
+        self.loop.goes_on = lambda: session.goes_on
+        if self._settings.kiosk is not None:
+            session.kiosk = Kiosk(session.transport, self._settings.kiosk)
         return session
 
     def status(self) -> ShowStatus:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -167,3 +168,38 @@ def test_the_fader_of_the_loop_is_the_sessions(tmp_path: Path) -> None:
         session = show.controls.session
         assert session is not None
         assert session.transport.loop
+
+
+def test_a_kiosk_plays_while_nobody_is_there(tmp_path: Path) -> None:
+    """Somebody performs for 1 s of 3: the session plays half a second after they have left."""
+    path = tmp_path / "s.bunraku"
+    with open_show(path) as show:
+        record(show, 40)
+    wave = builtin_recording("wave")
+    count = min(len(wave), 180)
+    positions, confidence = wave.positions[:count].copy(), wave.confidence[:count].copy()
+    positions[60:], confidence[60:] = np.nan, 0.0
+    seen = replace(
+        wave,
+        times=wave.times[:count],
+        positions=positions,
+        confidence=confidence,
+        rotations=None,
+        performers=wave.performers[:count],
+        arrivals=wave.arrivals[:count],
+        blends=None,
+    )
+    modes = []
+    stream = play(seen, every_frame=True, loop=True)
+    settings = ShowSettings(kiosk=0.5)
+    characters = [load_character("mannequin")]
+    with Show(stream, characters, settings, session=SessionStore(path)) as show:
+        session = show.controls.session
+        assert session is not None
+        for _ in range(2 * count):
+            show.tick()
+            modes.append(session.transport.mode)
+    assert set(modes[2:58]) == {Mode.REHEARSING}
+    assert set(modes[95:count]) == {Mode.PLAYING}
+    assert set(modes[count + 2 : count + 58]) == {Mode.REHEARSING}
+    assert modes[-1] is Mode.PLAYING
