@@ -20,6 +20,7 @@ _SHOULDER = 0.17  # of the distance of the acromions (Rab)
 # Half the width of a joint and of a marker, of the distance of the front of the pelvis (0.24 m).
 _KNEE, _ANKLE, _ELBOW = 0.26, 0.19, 0.18
 _PELVIS_OF_HIPS = 1.39  # distance of the front of the pelvis, of that of the hips (0.72 by Bell)
+_NO_BONE = 0.04  # of the trunk's length
 _BENT = 0.35  # sine of the bend beyond which the axis of a joint is seen
 
 
@@ -137,15 +138,14 @@ def _legs(
 
 
 def _trunk(placed: Mapping[str, Array], joints: dict[str, Array]) -> None:
-    base = placed.get("neck")  # of key points: between the shoulders
-    if base is None and {"LeftUpperArm", "RightUpperArm"} <= joints.keys():
-        base = (joints["LeftUpperArm"] + joints["RightUpperArm"]) / 2
-    if base is not None:
-        joints["UpperChest"] = base
-    for joint, places in (("Chest", ("t10", "sternum")), ("Neck", ("c7", "clavicle"))):
-        between = _mean(placed, *places)
-        if between is not None:
-            joints[joint] = between
+    if {"LeftUpperArm", "RightUpperArm"} <= joints.keys():
+        joints["UpperChest"] = (joints["LeftUpperArm"] + joints["RightUpperArm"]) / 2
+    chest, neck = _mean(placed, "t10", "sternum"), _mean(placed, "c7", "clavicle")
+    neck = placed.get("neck") if neck is None else neck
+    if chest is not None:
+        joints["Chest"] = chest
+    if neck is not None and not _coincide(neck, joints.get("UpperChest"), joints.get("Hips")):
+        joints["Neck"] = neck
     corners = [f"{side} {place}" for side, *_ in SIDES for place in ("head front", "head back")]
     for names in (corners, ("left ear", "right ear"), ("head", "nose"), ("head",), ("nose",)):
         head = _mean(placed, *names)
@@ -207,6 +207,13 @@ def _hinge(hip: Array, knee: Array, ankle: Array, inward: Array) -> Array:
     return _unit((1.0 - share) * level + share * _unit(bend))
 
 
+def _coincide(neck: Array, shoulders: Array | None, hips: Array | None) -> bool:
+    """Whether a neck is a key point between the shoulders, which leaves no bone to it."""
+    if shoulders is None or hips is None:
+        return False
+    return not _usual(neck - shoulders) > _NO_BONE * _usual(shoulders - hips)
+
+
 def _first(placed: Mapping[str, Array], *names: str) -> Array | None:
     return next((placed[name] for name in names if name in placed), None)
 
@@ -242,8 +249,11 @@ def missing_parts(joints: Sequence[str]) -> str:
     """Which markers make a body of these joints, or "" if they are one: hips with legs or arms."""
     if "Hips" not in joints:
         return "a pelvis (LASI RASI LPSI RPSI)"
-    legs = [f"{side}{bone}" for _, side, _ in SIDES for bone in ("LowerLeg", "Foot")]
-    arms = [f"{side}{bone}" for _, side, _ in SIDES for bone in ("LowerArm", "Hand")]
-    if not set(legs) <= set(joints) and not set(arms) <= set(joints):
+    if not has_limbs(joints, "LowerLeg", "Foot") and not has_limbs(joints, "LowerArm", "Hand"):
         return "both legs (LKNE RKNE LANK RANK) or both arms (LSHO RSHO LELB RELB LWRA LWRB ...)"
     return ""
+
+
+def has_limbs(joints: Sequence[str], *bones: str) -> bool:
+    """Whether the joints are there on both sides."""
+    return all(f"{side}{bone}" in joints for _, side, _ in SIDES for bone in bones)

@@ -14,7 +14,7 @@ from devices.errors import ContentError
 from devices.printable import printable
 from devices.skeleton import Skeleton
 from replay.bounds import check_poses
-from replay.markers.joint_centres import joint_centres, missing_parts
+from replay.markers.joint_centres import has_limbs, joint_centres, missing_parts
 from replay.markers.marker_names import Subject, subjects
 from replay.orientation import hips_at_leg_height, up_axis
 from replay.recording import Recording
@@ -26,6 +26,10 @@ Array = NDArray[np.float64]
 _MOST_NAMED = 8  # markers and subjects in a message
 _MOST_LETTERS = 24
 _AXES = "XYZ"
+_LIMBS = (
+    ("legs", ("LowerLeg", "Foot"), "LKNE RKNE LANK RANK"),
+    ("arms", ("LowerArm", "Hand"), "LSHO RSHO LELB RELB LWRA RWRA"),
+)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,6 +72,9 @@ def body_of_markers(motion: MarkerMotion, stated: Stated, notes: list[str]) -> R
     if lacking := missing_parts(list(joints)):
         raise ContentError(_unknown(motion.names, lacking))
     notes.append(f"{len(joints)} joints from {len(subject.markers)} of {len(motion.names)} markers")
+    for limbs, bones, lacking in _LIMBS:
+        if not has_limbs(list(joints), *bones):
+            notes.append(f"{limbs} that lack markers are left out; {lacking} are needed")
     positions = np.stack(list(joints.values()), axis=1)
     skeleton = _rest(list(joints), positions)
     positions = np.stack([joints[name] for name in skeleton.names], axis=1)

@@ -138,6 +138,7 @@ def test_of_two_subjects_the_whole_one_is_read(tmp_path: Path) -> None:
         ("RHJC_study", "right hip"),
         ("RHip", "right hip point"),
         ("V.Sacral", "sacrum"),
+        ("R.Wrist.Med", "right wrist little"),
         ("LFEP", "left hip"),
         ("LBigToe", "left toe"),
         ("LTHI", None),
@@ -177,6 +178,18 @@ def test_key_points_of_pose2sim_are_joints(tmp_path: Path) -> None:
         points |= {side[0] + name: JOINTS[side + bone] for side in ("Left", "Right")}
     points |= {"Neck": JOINTS["UpperChest"], "Head": JOINTS["Head"]}
     assert_alike(read(tmp_path, trc_text(points, unit="m", factor=1.0), "p.trc"), within=1e-4)
+
+
+def test_a_neck_above_the_shoulders_is_a_joint_and_lacking_legs_are_told(tmp_path: Path) -> None:
+    points = {side[0] + "Hip": JOINTS[side + "UpperLeg"] for side in ("Left", "Right")}
+    for name, bone in (("Shoulder", "UpperArm"), ("Elbow", "LowerArm"), ("Wrist", "Hand")):
+        points |= {side[0] + name: JOINTS[side + bone] for side in ("Left", "Right")}
+    points |= {"Neck": JOINTS["UpperChest"] + [0.0, 0.08, 0.0], "Head": JOINTS["Head"]}
+    recording = read(tmp_path, trc_text(points, unit="m", factor=1.0), "p.trc")
+    names = recording.skeleton.names
+    assert recording.skeleton.parents[names.index("LeftUpperArm")] == names.index("UpperChest")
+    assert recording.skeleton.parents[names.index("Head")] == names.index("Neck")
+    assert any("legs that lack markers are left out" in note for note in recording.notes)
 
 
 def test_trc_with_decimal_commas_and_names_for_each_axis(tmp_path: Path) -> None:
