@@ -133,10 +133,8 @@ class ArapSolver:
             ValueError: as the constructor; the solver is then unchanged.
         """
         new = checked_handles(handles, groups, weights, self._layout)
-        goals = self._x[new.places]
-        _, old, kept = np.intersect1d(self._handles.places, new.places, return_indices=True)
-        goals[kept] = self._goals[old]
-        self._goals, self._handles = goals, new
+        self._goals = new.goals_after(self._handles, self._goals, self._x)
+        self._handles = new
         self._carried = CarriedParts.of(self._rest, new, self._layout)
         self._system.constrain(self._constraints())
         self._influence.hold(new)

@@ -201,7 +201,7 @@ def test_a_player_can_stand_in_for_a_device() -> None:
 
 
 MOST_MODULES = 20  # in a folder, without its __init__.py
-MOST_LINES = 400  # of a file
+MOST_LINES = 399  # of a file
 SUPPRESSED = re.compile(r"# *(?:noqa|type: *ignore)\b.*")
 REASONED = re.compile(r"# (?:noqa: [A-Z]+\d+(?:, [A-Z]+\d+)*|type: ignore\[[\w, -]+\])  # \S.+")
 

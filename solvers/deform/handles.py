@@ -45,6 +45,19 @@ class Handles:
         """Whether each of `count` vertices is a handle, and none is met exactly."""
         return len(self.places) == count and not self.hard.any()
 
+    def goals_after(self, before: Handles, goals: Floats, x: Floats) -> Floats:
+        """Return where these handles start: at their goals of before, or where x has them.
+
+        Args:
+            before: the handles that these replace.
+            goals: theirs (G, 3).
+            x: the vertices (N, 3).
+        """
+        start: Floats = x[self.places]
+        _, old, kept = np.intersect1d(before.places, self.places, return_indices=True)
+        start[kept] = goals[old]
+        return start
+
     def reweighted(self, weights: ArrayLike) -> Handles:
         """The same handles with other weights (H,)."""
         return Handles(self.places, self.group_of, self.count, _checked_weights(weights, self))
