@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from imgui_bundle import ImVec2, imgui
 
 from runtime.control.show_controls import ShowControls
-from runtime.panel.widgets import Colour, card, dot, fitted
+from runtime.driving.driver import ABSOLUTE, RELATIVE, DrivenPart
+from runtime.panel.widgets import SMALL, Colour, card, dot, fitted, letters
 from runtime.render.tubes import PAIR_COLOURS
 from runtime.status.show_status import CharacterStatus, ShowStatus
 
-WIDTH = 236.0  # [px] in a picture of the usual height
+WIDTH = 262.0  # [px] in a picture of the usual height
+WAYS = {
+    ABSOLUTE: "absolute: points where yours points",
+    RELATIVE: "relative: turns as yours turns",
+}
 FULL_GAIN = 0.995  # from which a gain is not worth a word
 
 
@@ -51,28 +58,42 @@ def _draw_name(number: int, status: ShowStatus, controls: ShowControls) -> None:
 
 def _draw_parts(character: CharacterStatus, scale: float) -> None:
     imgui.indent()
-    if not character.parts:
-        imgui.text_disabled("nothing yet")
-    for part, (source, target, way) in enumerate(_rows(character)):
-        dot(_encoded(part), 5.0 * scale)
-        imgui.text(source)
-        imgui.same_line(0.0, 5.0 * scale)
-        imgui.text_disabled("to")
-        imgui.same_line(0.0, 5.0 * scale)
-        imgui.text(fitted(target, imgui.get_content_region_avail().x))
-        if way:
-            imgui.same_line()
-            imgui.text_disabled(way)
+    with letters(SMALL):
+        imgui.text_disabled(_way(character.parts))
+    for number, part in enumerate(character.parts):
+        imgui.begin_group()
+        dot(_encoded(number), 5.0 * scale)
+        _draw_pair(part, scale)
+        imgui.end_group()
+        if imgui.is_item_hovered():
+            imgui.set_tooltip(str(part))
     imgui.unindent()
     imgui.dummy(ImVec2(0.0, 2.0 * scale))
 
 
-def _rows(character: CharacterStatus) -> list[tuple[str, str, str]]:
-    """Source, target and share of each part, where it is not whole."""
-    return [
-        (part.name, part.target_name, "" if part.gain > FULL_GAIN else f"{100 * part.gain:.0f} %")
-        for part in character.parts
-    ]
+def _draw_pair(part: DrivenPart, scale: float) -> None:
+    """What drives what, and how much of it where that is not all; shortened to its line."""
+    share = "" if part.gain > FULL_GAIN else f"{100.0 * part.gain:.0f} %"
+    gap = 5.0 * scale
+    room = imgui.get_content_region_avail().x
+    room -= imgui.calc_text_size(f"{part.name}to{share}").x + 2.0 * gap + (gap if share else 0.0)
+    whole, short = part.target_name, part.target_name.partition(",")[0]
+    target = fitted(whole if imgui.calc_text_size(whole).x <= room else short, room)
+    imgui.text(part.name)
+    for words, quiet in (("to", True), (target, False), (share, True)):
+        if words:
+            imgui.same_line(0.0, gap)
+            (imgui.text_disabled if quiet else imgui.text)(words)
+
+
+def _way(parts: Sequence[DrivenPart]) -> str:
+    """How parts follow, in a few words."""
+    drives = {part.drive for part in parts}
+    if not drives:
+        return "follows nothing yet"
+    if len(drives) > 1:
+        return "some absolute, some relative"
+    return WAYS[drives.pop()]
 
 
 def _encoded(part: int) -> Colour:
