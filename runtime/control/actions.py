@@ -16,16 +16,16 @@ from runtime.control.sliders import SLIDERS, STEP, Slider
 from runtime.session.session_takes import record_into
 
 STEPS = {
-    "order": ("Order", "dropping late and duplicate frames, on or off"),
-    "identities": ("Identities", "steady identities, on or off"),
-    "swaps": ("Swapped limbs", "putting swapped limbs right, on or off"),
-    "outliers": ("Outliers", "the gate for outliers, on or off"),
-    "filter": ("Smoothing", "smoothing, on or off"),
-    "predict": ("Prediction", "prediction, on or off"),
-    "level": ("Level floor", "levelling the floor, on or off"),
-    "mirror": ("Mirror", "exchanging left and right, on or off"),
-    "scale": ("One size", "one size for all performers, on or off"),
-    "recalibrate": ("T pose", "calibrating by a T or A pose kept still, on or off"),
+    "order": ("Leave out late frames", "dropping late and duplicate frames, on or off"),
+    "identities": ("Tell people apart", "steady identities, on or off"),
+    "swaps": ("Put swapped limbs right", "putting swapped limbs right, on or off"),
+    "outliers": ("Leave out wild jumps", "the gate for outliers, on or off"),
+    "filter": ("Smooth trembling", "smoothing, on or off"),
+    "predict": ("Make up for delay", "prediction, on or off"),
+    "level": ("Level the floor", "levelling the floor, on or off"),
+    "mirror": ("Mirror left and right", "exchanging left and right, on or off"),
+    "scale": ("Same size for all", "one size for all performers, on or off"),
+    "recalibrate": ("Learn from a T pose", "calibrating by a T or A pose kept still, on or off"),
 }
 
 
@@ -167,7 +167,7 @@ ACTIONS: Mapping[str, Action] = {
         read=lambda controls: float(controls.match_controls.matching),
     ),
     "accept": Action(
-        "Accept",
+        "Use this match",
         "accept the match shown; the pose is the rest state",
         press=lambda controls: controls.match_controls.accept(),
     ),
@@ -216,7 +216,7 @@ ACTIONS: Mapping[str, Action] = {
         _freeze,
     ),
     "in-place": switch(
-        "In place",
+        "Stay in place",
         "in place: characters stay where they are, or travel as their performers do",
         lambda controls: controls.selected[0].travel.in_place,
         _in_place,
@@ -231,14 +231,14 @@ ACTIONS: Mapping[str, Action] = {
         "Next character", "select the next character for the keys, or all", press=_select
     ),
     "keep-match": Action(
-        "Keep",
+        "Go on as before",
         "stop matching: go on as before",
         press=lambda controls: controls.match_controls.keep(),
     ),
     "front": Action("Front", "look from the front again", press=_front),
     "frame-all": Action("Frame all", "frame every character", press=_frame_all),
     "chains": switch(
-        "Chains",
+        "Show chains",
         "show or hide the matched chains",
         lambda controls: controls.scene is not None and controls.scene.highlights,
         _chains,

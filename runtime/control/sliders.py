@@ -21,6 +21,7 @@ class Slider:
         field: its field of `Elasticity`, in [0, `most`].
         most: the fader's upper end.
         text: what the fader sets.
+        hint: what its ends mean, in a few words.
         more: what the action that raises it does.
         less: what the action that lowers it does.
     """
@@ -29,6 +30,7 @@ class Slider:
     field: str
     most: float
     text: str
+    hint: str
     more: str
     less: str
 
@@ -67,6 +69,7 @@ SLIDERS: Mapping[str, Slider] = {
         "cartoon",
         1.0,
         "how much characters squash and stretch, from not at all",
+        "0 %: limbs keep their length",
         "more squash and stretch",
         "less squash and stretch",
     ),
@@ -75,6 +78,7 @@ SLIDERS: Mapping[str, Slider] = {
         "volume_gain",
         2.0,  # the middle of the fader keeps exactly the volume
         "how much of their volume is kept; more than all of it above the middle",
+        "100 %: keeps its volume exactly",
         "keep more of the volume",
         "keep less of the volume",
     ),
@@ -83,6 +87,7 @@ SLIDERS: Mapping[str, Slider] = {
         "stiffness",
         0.99,  # at 1 the deformation of a limb has no solution
         "how stiff limbs are between their joints",
+        "0 %: soft as dough; 99 %: like wood",
         "stiffer limbs",
         "softer limbs",
     ),

@@ -10,6 +10,67 @@ from runtime.control.show_controls import ShowControls
 from runtime.panel.gui import GOLD
 from runtime.panel.widgets import card, heading, letters
 
+COLUMNS: tuple[dict[str, tuple[str, ...]], ...] = (
+    {
+        "Matching": (
+            "match-again",
+            "accept",
+            "next-match",
+            "previous-match",
+            "keep-match",
+            "rest-pose",
+            "calibrate",
+        ),
+        "Playing": ("hold", "home", "freeze", "select", "leave"),
+        "Recording": (
+            "record",
+            "rehearse",
+            "undo",
+            "redo",
+            "retake",
+            "recall",
+            "save",
+            "loop",
+        ),
+    },
+    {
+        "Look": (
+            "help",
+            "panel",
+            "sliders",
+            "frame-all",
+            "front",
+            "chains",
+            "full-screen",
+            "blackout",
+            "in-place",
+        ),
+        "Surface": (
+            "cartoon-up",
+            "cartoon-down",
+            "volume-up",
+            "volume-down",
+            "stiffness-up",
+            "stiffness-down",
+        ),
+        "Corrections": (
+            "mirror",
+            "filter",
+            "predict",
+            "outliers",
+            "swaps",
+            "identities",
+            "level",
+            "scale",
+            "recalibrate",
+            "order",
+        ),
+    },
+)
+"""The groups of actions in each column, those most used first."""
+
+SPELLED = {".": ". dot", ",": ", comma"}
+TEXT = 350.0  # [px] the longest line of a text in a picture of the usual height
 MOUSE = (
     ("left button", "turn round the stage"),
     ("right button", "shift the picture"),
@@ -17,29 +78,46 @@ MOUSE = (
 )
 
 
-def draw_keys(controls: ShowControls, margin: float, scale: float) -> None:
-    """Draw every key with what it does, over the whole picture; a click closes it."""
+def draw_keys(controls: ShowControls, left: float, margin: float, scale: float) -> None:
+    """Draw every key with what it does, in groups, from `left` [px] on; a click closes it."""
     screen = imgui.get_io().display_size
-    width = min(980.0 * scale, screen.x - 2.0 * margin)
-    height = min(640.0 * scale, screen.y - 2.0 * margin)
-    left, top = (screen.x - width) / 2.0, (screen.y - height) / 2.0
-    with card("keys", left, top, width, height, opacity=0.96):
+    width, height = screen.x - left - margin, screen.y - 2.0 * margin
+    spacing = imgui.get_style().item_spacing
+    with card("keys", left, margin, width, opacity=0.96, most=height):
         with letters(1.4):
             imgui.text("Keys")
         imgui.same_line()
         imgui.text_disabled("  ? or a click closes this page")
-        rows = [(key, ACTIONS[name].text) for key, name in KEYS.items()]
-        half = (len(rows) + len(MOUSE) + 2) // 2
-        if imgui.begin_table("two", 2):
-            imgui.table_next_column()
-            _draw_rows("left", rows[:half], scale)
-            imgui.table_next_column()
-            _draw_rows("right", rows[half:], scale)
-            heading("Mouse")
-            _draw_rows("mouse", list(MOUSE), scale)
+        imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(spacing.x, 0.45 * spacing.y))
+        if imgui.begin_table("columns", len(COLUMNS)):
+            for column, groups in enumerate(_columns()):
+                imgui.table_next_column()
+                for name, rows in groups:
+                    heading(name)
+                    _draw_rows(f"{name}{column}", rows, scale)
+                    imgui.dummy(ImVec2(0.0, 2.0 * scale))
             imgui.end_table()
+        imgui.pop_style_var()
         if imgui.is_window_hovered() and imgui.is_mouse_clicked(0):
             controls.view.help = False
+
+
+def _columns() -> list[list[tuple[str, list[tuple[str, str]]]]]:
+    """Each column's groups, with their rows of keys and texts; keys of no group come after them."""
+    key_of = {name: key for key, name in KEYS.items()}
+    grouped = [name for groups in COLUMNS for names in groups.values() for name in names]
+    rest = [name for name in KEYS.values() if name not in grouped]
+    columns = [
+        [
+            (group, [(key_of[name], ACTIONS[name].text) for name in names])
+            for group, names in groups.items()
+        ]
+        for groups in COLUMNS
+    ]
+    if rest:
+        columns[0].append(("More", [(key_of[name], ACTIONS[name].text) for name in rest]))
+    columns[0].append(("Mouse", list(MOUSE)))
+    return columns
 
 
 def _draw_rows(name: str, rows: list[tuple[str, str]], scale: float) -> None:
@@ -47,9 +125,9 @@ def _draw_rows(name: str, rows: list[tuple[str, str]], scale: float) -> None:
         return
     for key, text in rows:
         imgui.table_next_column()
-        imgui.text_colored(ImVec4(*GOLD, 1.0), key)
+        imgui.text_colored(ImVec4(*GOLD, 1.0), SPELLED.get(key, key))
         imgui.table_next_column()
-        imgui.push_text_wrap_pos(imgui.get_cursor_pos().x + 370.0 * scale)
+        imgui.push_text_wrap_pos(imgui.get_cursor_pos().x + TEXT * scale)
         imgui.text(text)
         imgui.pop_text_wrap_pos()
     imgui.end_table()

@@ -77,13 +77,13 @@ class Panel:
     def _lay_out(self) -> None:
         status, controls, scale = self._newest_status(), self._controls, self.gui.scale
         margin = MARGIN * scale
+        inset = 0.0 if controls.scene is None else controls.scene.inset_side
         self._take_room(margin)
         if controls.view.help:
-            draw_keys(controls, margin, scale)
+            draw_keys(controls, margin + inset, margin, scale)
             return
         above = margin
         if controls.view.panel:
-            inset = 0.0 if controls.scene is None else controls.scene.inset_side
             draw_status(status, inset + margin, scale, margin)
             above = draw_bar(status, controls, margin, scale)
             if controls.session is not None:
@@ -91,7 +91,7 @@ class Panel:
             self._above = above
             draw_legend(status, controls, margin, scale, inset, above)
             if controls.view.sliders:
-                draw_sliders(controls, margin, scale)
+                draw_sliders(controls, margin, scale, above)
         draw_countdown(status, scale)
         draw_notices(controls.notices.current, above, scale)
 

@@ -2,26 +2,37 @@
 
 from __future__ import annotations
 
-from imgui_bundle import imgui
+from imgui_bundle import ImVec2, imgui
 
 from runtime.conditioning.switches import SWITCHES
 from runtime.control.show_controls import ShowControls
 from runtime.control.sliders import SLIDERS
-from runtime.panel.widgets import card, fader, heading, switch
+from runtime.panel.widgets import card, fader, fitted, heading, switch
 
 WIDTH = 250.0  # [px] in a picture of the usual height
 OF_CHARACTERS = ("in-place", "chains")
 
 
-def draw_sliders(controls: ShowControls, margin: float, scale: float) -> None:
-    """Draw the column at the right."""
-    with card("sliders", -margin, margin, WIDTH * scale):
-        heading("Character")
+def draw_sliders(controls: ShowControls, margin: float, scale: float, above: float) -> None:
+    """Draw the column at the right, down to `above` the lower border of the picture [px]."""
+    most = imgui.get_io().display_size.y - above - margin
+    spacing = imgui.get_style().item_spacing
+    imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(spacing.x, 0.5 * spacing.y))
+    with card("sliders", -margin, margin, WIDTH * scale, most=most):
+        heading(fitted(_whose(controls), imgui.get_content_region_avail().x))
         for name in SLIDERS:
             fader(name, controls)
         for name in OF_CHARACTERS:
             switch(name, controls)
         imgui.separator()
-        heading("Performer")
+        heading("Corrections of the performer")
         for name in SWITCHES:
             switch(name, controls)
+    imgui.pop_style_var()
+
+
+def _whose(controls: ShowControls) -> str:
+    """Whose sliders they are."""
+    if len(controls.selected) == 1:
+        return f"Character: {controls.selected[0].character.name}"
+    return f"All {len(controls.selected)} characters"

@@ -10,6 +10,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from runtime.control.actions import ACTIONS, press, set_value
 from runtime.control.keys import KEYS
 from runtime.control.show_controls import ShowControls
+from runtime.control.sliders import SLIDERS
 from runtime.panel.gui import GOLD, LACQUER
 
 Colour = tuple[float, float, float]
@@ -20,6 +21,7 @@ FIXED = (
     | imgui.WindowFlags_.no_saved_settings
     | imgui.WindowFlags_.no_nav
 )
+SMALL = 0.86  # times the height of usual letters
 KEY_OF = {name: key for key, name in KEYS.items()}
 
 
@@ -78,23 +80,25 @@ def button(
 
 
 def hint(name: str) -> None:
-    """What the widget before does, and its key, while the mouse is over it."""
-    if imgui.is_item_hovered(imgui.HoveredFlags_.delay_short):
+    """What the widget before does, and its key, at once while the mouse is over it."""
+    if imgui.is_item_hovered():
         key = f"  [{KEY_OF[name]}]" if name in KEY_OF else ""
-        imgui.set_tooltip(f"{ACTIONS[name].text}{key}")
+        imgui.set_tooltip(f"{ACTIONS[name].label}: {ACTIONS[name].text}{key}")
 
 
 def fader(name: str, controls: ShowControls) -> None:
-    """A slider that sets an action's value."""
-    action = ACTIONS[name]
+    """A slider that sets an action's value, with its number and what its ends mean."""
+    action, slider = ACTIONS[name], SLIDERS[name]
     assert action.read is not None
-    imgui.text(action.label)
+    imgui.text(slider.words(controls))
     imgui.set_next_item_width(-1.0)
     before = action.read(controls)
     changed, value = imgui.slider_float(f"##{name}", before, 0.0, 1.0, "")
     if changed and value != before:
         set_value(name, value, controls)
     hint(name)
+    with letters(SMALL):
+        imgui.text_disabled(slider.hint)
 
 
 def switch(name: str, controls: ShowControls) -> None:

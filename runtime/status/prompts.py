@@ -51,7 +51,7 @@ def advice(status: ShowStatus) -> str:
     if is_paused(status):
         return "Space plays on. Drag the line below to go to another moment."
     if status.frozen:
-        return "The characters stand still. Press e to let them move again."
+        return "The characters stand still, the performer goes on. Press e to let them move again."
     sighting = status.sighting
     if sighting.trouble:
         return sighting.trouble

@@ -13,8 +13,11 @@ from numpy.typing import NDArray
 
 from replay.player import EveryFrame, Player
 from runtime.control.actions import ACTIONS
+from runtime.control.keys import KEYS
 from runtime.control.show_controls import ShowControls
+from runtime.driving.choices import Candidate
 from runtime.driving.driver import RELATIVE, DrivenPart
+from runtime.panel import keys_page
 from runtime.panel.panel import Panel
 from runtime.show.scene import NOTHING_TAKEN
 from runtime.status.show_status import ShowStatus
@@ -162,6 +165,50 @@ def test_buttons_of_the_bar_do_their_actions_and_clicks_beside_it_pass(
         show.takes.stop()
     assert pressed >= {"hold", "freeze", "blackout", "help", "panel"}
     assert not screen.click(800, 400)
+
+
+def test_the_last_button_of_a_full_bar_stays_in_the_picture(
+    screen: Screen, show: StagedShow
+) -> None:
+    status = show._opened.status()
+    sought = replace(
+        status.characters[0],
+        name="mannequin",
+        candidate=Candidate(1, 21, 0.8),
+        matching=True,
+        performing=True,
+    )
+    screen.status = lambda: replace(status, characters=[sought, sought])
+    bar = _top_of_bar(screen.draw()) + 26
+    for x in range(1255, 1200, -6):
+        screen.click(x, bar)
+        if show.controls.view.help:
+            return
+    pytest.fail("the last button shows the keys")
+
+
+def test_a_button_says_at_once_what_it_does(screen: Screen) -> None:
+    picture = screen.draw()
+    bar = _top_of_bar(picture)
+    before = covered(picture)[:bar].copy()
+    screen.panel.gui.cursor(1236.0, bar + 26.0)
+    screen.draw(1)
+    screen.now -= 0.19  # hardly any time later
+    assert (covered(screen.draw(1))[:bar] & ~before).sum() > 1000
+
+
+def test_the_page_of_keys_has_every_key_once() -> None:
+    shown = [key for groups in keys_page._columns() for _, rows in groups for key, _ in rows]
+    mouse = [key for key, _ in keys_page.MOUSE]
+    assert sorted(shown) == sorted([*KEYS, *mouse])
+
+
+def test_sliders_leave_the_bar_free(screen: Screen, show: StagedShow) -> None:
+    show.controls.view.sliders = True
+    over = covered(screen.draw())
+    bar = _top_of_bar(screen.draw())
+    assert over[100:400, 1100].all()
+    assert not over[bar - 4 : bar].any()
 
 
 def _lit(controls: ShowControls, name: str) -> float:
