@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 _BOW = np.radians(60.0)  # as deep as performers bow
 _NODS = 0.35  # a head nods at least by this share
 _NO_YAW = 1e-6
+_LOW = 0.2  # of half its length: a level trunk that can sink by less, as a lizard's, is low
 _LOWEST = 5.0  # percentile of the heights of a trunk's surface
 
 
@@ -45,6 +46,13 @@ def low_bearing(room: float, half: float) -> Bearing:
     share = np.arcsin(min(room / max(half, 1e-9), 1.0)) / _BOW
     shares = np.minimum([share, share, max(share, _NODS)], 1.0)
     return Bearing(shares, np.tile([0.0, 0.0, 0.0, 1.0], (3, 1)))
+
+
+def is_low(bodies: TwoBodies, room: float, half: float) -> bool:
+    """Whether a trunk is level and near the floor, by what `room_below` says of it."""
+    plan, rest = bodies.plan, bodies.tree.positions
+    x, y, z = rest[plan.trunk[-1]] - rest[plan.hips]
+    return bool(np.hypot(x, z) > abs(y) and room < _LOW * half)
 
 
 def room_below(bodies: TwoBodies, vertices: Array, owner: NDArray[np.int64]) -> tuple[float, float]:

@@ -12,7 +12,7 @@ from devices.bodies.body_plan import SIDES
 from devices.bodies.plan_by_names import plan_by_names
 from devices.bodies.rest_heading import rest_heading
 from devices.errors import InputError
-from runtime.driving.body.bearing import Bearing, low_bearing, room_below
+from runtime.driving.body.bearing import Bearing, is_low, low_bearing, room_below
 from runtime.driving.body.body_parts import TwoBodies, body_parts
 from runtime.driving.body.footing import Footing, FootingState
 from runtime.driving.body.held_hands import HeldHands, are_held
@@ -107,9 +107,10 @@ class BodyDriver:
         self._ratio = self._size_ratio(bodies.upright)
         self._bearing: Bearing | None = None
         self._many_legs: ManyLegs | None = None
-        if parts.steps:
-            room, half = room_below(bodies, vertices, owner)
+        room, half = room_below(bodies, vertices, owner)
+        if parts.steps or (parts.legs and is_low(bodies, room, half)):
             self._bearing = low_bearing(room, half)
+        if parts.steps:
             self._many_legs = ManyLegs(bodies, parts.steps, room)
             self._ratio = self._many_legs.ratio
         self._serpent = Serpent(bodies) if is_serpent(bodies, vertices) else None

@@ -19,7 +19,7 @@ from solvers.skeleton.quaternions import multiply
 
 Array = NDArray[np.float64]
 
-_RAISED = (np.radians(60.0), np.radians(85.0))  # the chest while the arms hang, while they are up
+_RAISED = (np.radians(40.0), np.radians(85.0))  # the chest while the arms hang, while they are up
 _SWAY = np.radians(40.0)  # the chest when both hands reach out to one side
 _HEAD = 0.5  # of the sway, that the head keeps
 _CROUCHED, _STANDING = 0.45, 0.95  # heights of the shoulders, of standing: lies flat, is raised
