@@ -105,11 +105,12 @@ def hips_at_leg_height(
         )
         for side in _SIDES
     ]
-    lengths = [np.linalg.norm(leg, axis=1) for leg in legs if leg is not None]
+    lengths = np.array([np.linalg.norm(leg, axis=1) for leg in legs if leg is not None])
+    lengths = lengths[np.isfinite(lengths)]
     hips = _place(skeleton, parts, Kind.HIPS)
-    if hips is None or not lengths:
+    if hips is None or not lengths.size:
         return False
-    leg, height = np.nanmax(lengths), frames[:, hips] @ up
+    leg, height = lengths.max(), frames[:, hips] @ up
     height = height[np.isfinite(height)]
     low, high = (np.percentile(height, (10, 90)) / max(leg, 1e-12)) if height.size else (0.0, 0.0)
     return bool(low > 0.5 and high < 1.6)

@@ -95,6 +95,17 @@ def test_lost_markers_are_filled_in_or_missing(tmp_path: Path) -> None:
     np.testing.assert_allclose(recording.positions[10:20], whole.positions[10:20], atol=2e-3)
 
 
+def test_hips_and_feet_that_are_never_seen_together(tmp_path: Path) -> None:
+    gaps = {name: track.copy() for name, track in Z_UP.items()}
+    for name in ("LASI", "RASI", "LPSI", "RPSI"):
+        gaps[name][::2] = np.nan
+    for name in ("LANK", "LANKM", "RANK", "RANKM"):
+        gaps[name][1::2] = np.nan
+    recording = read(tmp_path, c3d_bytes(gaps, screen=("+X", "+Y")))
+    foot, hip = (recording.skeleton.index(f"Left{bone}") for bone in ("Foot", "UpperLeg"))
+    assert not (recording.confidence[:, foot] * recording.confidence[:, hip]).any()
+
+
 def test_a_rigid_cluster_is_completed_by_its_shape() -> None:
     shape = np.array([[0.1, 0, 0.1], [-0.1, 0, 0.1], [0.05, 0, -0.1], [-0.05, 0.02, -0.1]])
     turns = np.linspace(0, 3, 20)
