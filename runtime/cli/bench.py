@@ -14,7 +14,7 @@ from runtime.show.settings import DRIVES
 
 HELP = "measure the speed of this machine"
 
-DEFAULT = ("arap", "table1", "hold", "dense", "tick", "match", "spacetime")
+DEFAULT = ("arap", "table1", "hold", "dense", "tick", "layers", "match", "spacetime")
 LONG = ("clips", "likeness", "soak", "kill", "latency", "fuzz")  # only when named
 
 
@@ -24,7 +24,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "name",
         nargs="?",
         metavar="NAME",
-        help="arap, table1, hold, dense, tick, match or spacetime (default: all of these); or "
+        help="arap, table1, hold, dense, tick, layers, match or spacetime (default: all); or "
         "clips, likeness, soak, kill, latency or fuzz, which take long",
     )
     parser.add_argument(

@@ -120,7 +120,21 @@ def _towards(a: Quaternion, b: Quaternion, share: float) -> Quaternion:
     turn = multiply(conjugate(a), b)
     if turn[3] < 0.0:
         turn = (-turn[0], -turn[1], -turn[2], -turn[3])
-    return normalized(multiply(a, power(turn, share)))
+    return normalized(multiply(a, _part(turn, share)))
+
+
+@kernel
+def _part(turn: Quaternion, share: float) -> Quaternion:
+    """`power`; by series within 12 degrees, as from frame to frame, to 1e-11 in half the time."""
+    square = turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]
+    if square > 0.01:
+        return power(turn, share)
+    arc = 1.0 + square * (1 / 6 + square * (3 / 40 + square * (5 / 112 + square * 35 / 1152)))
+    part = share * arc  # times the sine of half the turn is half the angle
+    angle = part * part * square
+    scale = part * (1.0 - angle / 6 * (1.0 - angle / 20 * (1.0 - angle / 42)))
+    w = 1.0 - angle / 2 * (1.0 - angle / 12 * (1.0 - angle / 30 * (1.0 - angle / 56)))
+    return (turn[0] * scale, turn[1] * scale, turn[2] * scale, w)
 
 
 @kernel

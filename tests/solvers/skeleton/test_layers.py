@@ -125,3 +125,22 @@ def test_whole_weights_meet_the_ends_to_the_bit(weight: float) -> None:
     alone.override(over, 1.0)
     assert_array_equal(layered.turns, turns if weight == 0.0 else alone.turns)
     assert_array_equal(layered.shifts, shifts if weight == 0.0 else alone.shifts)
+
+
+@given(angle=st.floats(0.0, 0.25), share=st.floats(0.0, 1.0), seed=st.integers(0, 2**32 - 1))
+def test_frames_that_are_close_are_gone_between_exactly(
+    angle: float, share: float, seed: int
+) -> None:
+    """Within 12 degrees a series stands for the angle's functions: no jolt where it ends."""
+    random = np.random.default_rng(seed)
+    axis = random.normal(size=3)
+    first = Rotation.random(random_state=seed % 1000)
+    second = first * Rotation.from_rotvec(angle * axis / np.linalg.norm(axis))
+    ends = [each.as_quat().astype(np.float32)[None] for each in (first, second)]
+    still = np.zeros((1, 3), np.float32)
+    layered = LayeredNodes(Tree(np.array([-1]), np.zeros((1, 3))))
+    layered.override(LayerFrame(np.array([0]), (ends[0], ends[1]), (still, still), share), 1.0)
+    start, end = (Rotation.from_quat(each[0].astype(np.float64)) for each in ends)
+    wanted = start * Rotation.from_rotvec(share * (start.inv() * end).as_rotvec())
+    got = Rotation.from_quat(layered.turns[0])
+    assert (wanted.inv() * got).magnitude() < 1e-10
