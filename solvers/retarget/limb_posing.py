@@ -30,7 +30,7 @@ from solvers.kernels.quaternion import (
     quaternion,
     rotate,
 )
-from solvers.kernels.vector import across, dot, minus, point, scaled, unit
+from solvers.kernels.vector import across, dot, minus, norm, point, scaled, unit
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -40,6 +40,7 @@ RIDES: Final = -1
 BLENDS: Final = -2
 """Role of a node of the trunk or neck, between pelvis, chest and head."""
 
+_NOTHING: Final = 1e-9  # a length or share below which there is no direction
 _MOST_TWIST: Final = math.radians(270.0)  # of a forearm, before it takes the short way round
 
 
@@ -201,3 +202,84 @@ def _hand_frame(points: Array, near: int, far: int, first: int, second: int) -> 
     if dot(x, x) < 0.5 or dot(z, z) < 0.5:
         return (0.0, 0.0, 0.0, 0.0)
     return from_axes(x, z)
+
+
+@kernel
+def lift_segments(
+    positions: Array,
+    rotations: Array,
+    segments: Ints,
+    joints: Ints,
+    share: float,
+    aside: Array,
+    given: Array,
+) -> bool:
+    """Leave each segment that points below level a share of its angle; return whether any did.
+
+    Args:
+        positions: (K, 3) [m] of the nodes.
+        rotations: (K, 4) of the nodes.
+        segments: (n,) numbers of the segments, from the shoulder outward.
+        joints: (n + 1,) the nodes at their ends.
+        share: from 0 to 1.
+        aside: (3,) where a segment points if it hangs.
+        given: (S, 4) the rotations of the lifted segments are put here.
+    """
+    lifted = False
+    size = math.hypot(aside[0], aside[2])
+    for at in range(len(segments)):
+        way = minus(point(positions, joints[at + 1]), point(positions, joints[at]))
+        length = norm(way)
+        if length < _NOTHING or way[1] >= 0.0:
+            continue
+        own = scaled(way, 1.0 / length)
+        x, z = own[0], own[2]
+        if size > _NOTHING:
+            x += own[1] * own[1] / size * aside[0]
+            z += own[1] * own[1] / size * aside[2]
+        far = math.hypot(x, z)
+        if far < _NOTHING:
+            continue
+        angle = share * math.asin(min(-own[1], 1.0))
+        level = math.cos(angle) / far
+        goal = (level * x, -math.sin(angle), level * z)
+        turn = multiply(between(own, goal, (0.0, 0.0, 1.0)), quaternion(rotations, joints[at]))
+        for k in range(4):
+            given[segments[at], k] = turn[k]
+        lifted = True
+    return lifted
+
+
+@kernel
+def point_hands(
+    turned: Array,
+    change: Array,
+    joints: Array,
+    near: Ints,
+    far: Ints,
+    along: Array,
+    knuckles: Ints,
+    given: Array,
+) -> None:
+    """Let hands point where the joints say, rolled as rotations say.
+
+    Args:
+        turned: (S, 4) rotations of the performer's hands from rest; zero where unknown.
+        change: (S, 4) from the character's hand at rest to the performer's.
+        joints: (J, 3) [m] the performer, turned as the character faces.
+        near, far, along: as of `LimbRig`.
+        knuckles: (S, 2) its `across`. Hands whose knuckles are known are let be.
+        given: (S, 4) the rotations of the hands are put here.
+    """
+    for s in range(len(near)):
+        own = quaternion(turned, s)
+        if knuckles[s, 0] >= 0 or not is_rotation(own):
+            continue
+        turn = multiply(own, quaternion(change, s))
+        way = minus(point(joints, far[s]), point(joints, near[s]))
+        length = norm(way)
+        if length > 0.0:
+            goal = scaled(way, 1.0 / length)
+            turn = multiply(between(rotate(turn, point(along, s)), goal, (0.0, 0.0, 1.0)), turn)
+        for k in range(4):
+            given[s, k] = turn[k]

@@ -30,10 +30,10 @@ from runtime.driving.root_motion import chain_length
 from runtime.driving.targets import PosedNodes, Targets
 from solvers.retarget.heading import turned
 from solvers.retarget.joint_rotations import RestTurn
-from solvers.retarget.limb_posing import pose_limbs
+from solvers.retarget.limb_posing import point_hands, pose_limbs
 from solvers.retarget.steady_ends import SteadyEnds, SteadyEndsState
 from solvers.retarget.trunk_turns import UPRIGHT, trunk_turns
-from solvers.skeleton.quaternions import between, multiply, rotate
+from solvers.skeleton.quaternions import multiply, rotate
 
 Array = NDArray[np.float64]
 
@@ -231,14 +231,16 @@ class BodyDriver:
 
         Hips that are wider would lift one foot off the floor, and the body with the other.
         """
+        if self._sinking == 1.0:
+            return pelvis
         left = rotate(pelvis, self._left)
         sine = float(left[1])
         lower = np.arcsin(np.clip(self._sinking * sine, -1.0, 1.0)) - np.arcsin(
             np.clip(sine, -1.0, 1.0)
         )
-        front = np.cross(left, (0.0, 1.0, 0.0))
+        front = np.array([-left[2], 0.0, left[0]])
         long = float(np.linalg.norm(front))
-        if self._sinking == 1.0 or long < _LEVEL:
+        if long < _LEVEL:
             return pelvis
         half = 0.5 * lower
         return multiply(np.append(np.sin(half) / long * front, np.cos(half)), pelvis)
@@ -248,15 +250,9 @@ class BodyDriver:
 
         They point where the joints say, and the rotations decide how they are rolled.
         """
-        rig = self._parts.rig
+        rig, change = self._parts.rig, self._parts.hand_change
         given = np.zeros_like(hands)
-        for hand in np.flatnonzero(hands.any(axis=1) & (rig.across[:, 0] < 0)):
-            turn = multiply(hands[hand], self._parts.hand_change[hand])
-            way = joints[rig.far[hand]] - joints[rig.near[hand]]
-            length = float(np.linalg.norm(way))
-            if length > 0.0:
-                turn = multiply(between(rotate(turn, rig.along[hand]), way / length), turn)
-            given[hand] = turn
+        point_hands(hands, change, joints, rig.near, rig.far, rig.along, rig.across, given)
         return given
 
     def _middle_of(self, pose: Pose) -> Array:

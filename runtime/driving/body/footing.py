@@ -120,8 +120,7 @@ class Footing:
         if not len(feet):
             return
         ways = joints[self._parts[:, 1]] - joints[self._parts[:, 0]]
-        forward = np.cross(left, (0.0, 1.0, 0.0))
-        ways[~self._has_toes] = forward
+        ways[~self._has_toes] = (-left[2], 0.0, left[0])
         heights, stands = self._contacts.heights[:, 0], self._contacts.stands[:, 0]
         heights = self._ratio * heights
         turns = self._soles.turns(ways, left, heights, stands, time)

@@ -19,7 +19,8 @@ from numpy.typing import NDArray
 from devices.bodies.body_plan import Chain
 from runtime.driving.body.body_parts import Arm, Leg
 from runtime.driving.body.rig_builder import LOW
-from solvers.skeleton.quaternions import between, multiply
+from solvers.retarget.limb_posing import lift_segments
+from solvers.skeleton.quaternions import multiply
 from solvers.skeleton.tree import Tree
 
 Array = NDArray[np.float64]
@@ -27,7 +28,6 @@ Array = NDArray[np.float64]
 _ASIDE = 0.3  # of an arm's length: an arm this far below the floor is laid out level
 _JUST = 0.25  # of the shoulder's height: what hangs farther below the floor is a wing
 _WITH_HAND = 3  # segments
-_UP = np.array([0.0, 1.0, 0.0])
 _HANGS = (0.6, 0.9)  # of its length below the shoulder: where a foreleg is lifted, and stands
 _TILT = tuple(np.radians((-10.0, 35.0)))  # of a trunk, down and up, to stand on its forelegs
 _THICK = 90.0  # percentile of the distances from the surface of a hand to its bones
@@ -64,6 +64,8 @@ class LongArms:
         ]
         self._hands = [self._yielding(number) for number in range(len(self._arms))]
         self._reaches = [_reach(self._rest, arm) for arm in self._arms]
+        self._segments = [np.array(arm.segments, dtype=np.int64) for arm in self._arms]
+        self._joints = [np.array((*arm.starts, arm.target[-1])) for arm in self._arms]
 
     def _yielding(self, number: int) -> list[int]:
         """The nodes of a hand that gives way, as hanging it just reaches the floor; else none."""
@@ -103,8 +105,7 @@ class LongArms:
         """
         if not self._arms:
             return False
-        floor, asides = self._floor(positions, above), self._asides(positions, left)
-        lifted = False
+        floor, asides, lifted = self._floor(positions, above), None, False
         for number, arm in enumerate(self._arms):
             reach = self._reaches[number]
             is_wing = reach + self._radii[number] > (1.0 + _JUST) * self._heights[number]
@@ -112,12 +113,11 @@ class LongArms:
             if self._stands[number] or not is_wing or room >= reach:
                 continue
             share = float(np.arcsin(max(room / reach, 0.0))) / (0.5 * np.pi)
-            ends = (*arm.starts[1:], arm.target[-1])
-            for segment, node, end in zip(arm.segments, arm.starts, ends, strict=True):
-                turn = _lifted(positions[end] - positions[node], share, asides[number])
-                if turn is not None:
-                    given[segment] = multiply(turn, rotations[node])
-                    lifted = True
+            segments, joints = self._segments[number], self._joints[number]
+            if asides is None:
+                asides = self._asides(positions, left)
+            aside = asides[number]
+            lifted |= lift_segments(positions, rotations, segments, joints, share, aside, given)
         return lifted
 
     def raise_arms(
@@ -193,7 +193,7 @@ class LongArms:
         """Where each arm lies down if it hangs, (3,): to its own side, a foreleg forward."""
         shoulders = [arm.target[0] for arm in self._arms]
         middle = positions[shoulders if len(shoulders) > 1 else self._soles].mean(axis=0)
-        forward = np.cross(left, _UP)
+        forward = np.array([-left[2], 0.0, left[0]])
         return [
             forward if stands else (positions[shoulder] - middle) @ left * left
             for stands, shoulder in zip(self._stands, shoulders, strict=True)
@@ -204,30 +204,6 @@ def _reach(rest: Array, arm: Arm) -> float:
     """The length [m] of an arm that is stretched out."""
     joints = rest[[*arm.starts, arm.target[-1]]]
     return float(np.linalg.norm(np.diff(joints, axis=0), axis=1).sum())
-
-
-def _lifted(way: Array, share: float, aside: Array) -> Array | None:
-    """The rotation (4,) of a segment that leaves a share of its angle below level; None above it.
-
-    Args:
-        way: (3,) [m] along the segment.
-        share: from 0 to 1.
-        aside: (3,) where it points if it hangs.
-    """
-    length = float(np.linalg.norm(way))
-    if length < 1e-9 or way[1] >= 0.0:
-        return None
-    own = way / length
-    outward = aside * (1.0, 0.0, 1.0)
-    size = float(np.linalg.norm(outward))
-    level = own * (1.0, 0.0, 1.0)
-    if size > 1e-9:
-        level = level + own[1] ** 2 / size * outward
-    far = float(np.linalg.norm(level))
-    if far < 1e-9:
-        return None
-    angle = share * float(np.arcsin(min(-own[1], 1.0)))
-    return between(own, np.cos(angle) * level / far - np.sin(angle) * _UP)
 
 
 def _lowest(

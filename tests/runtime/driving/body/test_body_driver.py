@@ -86,6 +86,20 @@ def with_feet(*toes: tuple[float, float, float]) -> Character:
 CHARACTERS: dict[BodyDriver, Character] = {}
 
 
+def winged() -> Character:
+    """The figure with arms of 2.3 m, longer than its shoulders are high."""
+    figure = body()
+    rest, vertices = figure.skeleton.rest_positions.copy(), figure.vertices.copy()
+    for side, sign in (("L", 1.0), ("R", -1.0)):
+        arm = [node(f"{name}.{side}") for name in ("elbow", "wrist")]
+        rest[arm, 0] = sign * (0.2 + 3.5 * (np.abs(rest[arm, 0]) - 0.2))
+    far = np.abs(vertices[:, 0]) > 0.24
+    out = np.sign(vertices[far, 0]) * (0.2 + 3.5 * (np.abs(vertices[far, 0]) - 0.2))
+    vertices[far, 0] = out
+    skeleton = replace(figure.skeleton, rest_positions=rest)
+    return replace(figure, vertices=vertices, skeleton=skeleton)
+
+
 def driver_of(character: Character) -> BodyDriver:
     driver = BodyDriver(paired(Puppet(character)))
     CHARACTERS[driver] = character
@@ -362,3 +376,21 @@ def test_a_foot_that_leads_aside_at_rest_turns_to_where_the_performer_s_points()
     nodes = follow(driver_of(with_feet((0.08, -0.03, 0.06))), pose())[-1]
     turn = Rotation.from_quat(nodes.rotations[node("ankle.L")])
     assert np.degrees(turn.magnitude()) > 40.0
+
+
+def test_wings_show_each_angle_of_the_arms_between_hanging_and_level_above_the_floor() -> None:
+    driver = driver_of(winged())
+    shoulder, wrist = node("shoulder.L"), node("wrist.L")
+    below = np.radians([0.0, 30.0, 60.0, 90.0])
+    shown = []
+    for angle in below:
+        way = pose()[BODY.index("WristLeft")] - pose()[BODY.index("ShoulderLeft")]
+        hangs = np.arctan2(-way[1], way[0])  # of the performer at rest
+        turn = {"ShoulderLeft": (0, 0, hangs - angle), "ShoulderRight": (0, 0, angle - hangs)}
+        nodes = follow(driver, pose(), *[pose(turn)] * 3)[-1]
+        reach = nodes.positions[wrist] - nodes.positions[shoulder]
+        shown.append(np.arctan2(-reach[1], reach[0]))
+        assert nodes.positions[:, 1].min() > -1e-3
+    edge = shown[-1]
+    assert np.radians(20.0) < edge < np.radians(40.0)
+    np.testing.assert_allclose(shown, edge * below / below[-1], atol=np.radians(2.0))
