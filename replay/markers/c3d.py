@@ -72,7 +72,9 @@ def c3d_markers(data: bytes, notes: list[str]) -> MarkerMotion:
     said = _frames(parameters, first, last)
     if not count or not start:
         raise ContentError("it holds no markers; export it with its trajectories")
-    columns, seen = _points(data[(start - 1) * BLOCK :], parameters, count, analogue, scale, said)
+    columns, seen = _points(
+        memoryview(data)[(start - 1) * BLOCK :], parameters, count, analogue, scale, said
+    )
     if len(columns) < said:
         notes.append(f"the file ends after {len(columns)} of {said} frames")
     if not len(columns):
@@ -110,7 +112,7 @@ def _frames(parameters: Parameters, first: int, last: int) -> int:
 
 
 def _points(
-    data: bytes, parameters: Parameters, count: int, analogue: int, scale: float, frames: int
+    data: memoryview, parameters: Parameters, count: int, analogue: int, scale: float, frames: int
 ) -> tuple[NDArray[np.generic], NDArray[np.bool_]]:
     """Positions (T, M, 3) in the file's unit, and whether each was seen (T, M)."""
     real = not scale > 0.0
@@ -125,8 +127,11 @@ def _points(
         numbers = np.frombuffer(raw, dtype=">i2" if parameters.processor == MIPS else "<i2")
     points = numbers.reshape(frames, words)[:, : 4 * count].reshape(frames, count, 4)
     seen = points[..., 3] >= 0  # type: ignore[operator]  # numbers, of one kind or the other
-    places = points[..., :3]
-    return (places if real else places.astype(np.float32) * np.float32(scale)), seen
+    if real:
+        return points[..., :3], seen
+    places = points[..., :3].astype(np.float32)
+    places *= np.float32(scale)
+    return places, seen
 
 
 def _analogue(

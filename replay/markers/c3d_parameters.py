@@ -111,7 +111,7 @@ def _value(body: bytes) -> tuple[int, tuple[int, ...], bytes]:
     return (kind, dimensions, content[:count]) if 0 < count <= len(content) else (0, (), b"")
 
 
-def floats(data: bytes, processor: int) -> NDArray[np.floating]:
+def floats(data: bytes | memoryview, processor: int) -> NDArray[np.floating]:
     """The numbers of 32 bits in some bytes, which may be DEC's."""
     if processor != DEC:
         return np.frombuffer(data, dtype=">f4" if processor == MIPS else "<f4")

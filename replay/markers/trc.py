@@ -129,11 +129,9 @@ def _frames(
             continue
         numbers.extend(row + [np.nan] * (width - len(row)))
         count += 1
-        if not count % 1024:
-            check_poses(count, len(places))
+        check_poses(count, width // 3 + 1)
     if not count:
         raise ContentError("it holds no frame")
-    check_poses(count, len(places))
     if odd:
         notes.append(f"{odd} lines that are no frames were left out")
     table = np.frombuffer(numbers).reshape(count, width)

@@ -28,6 +28,7 @@ _MOST_LETTERS = 1 << 16  # of the numbers of one frame
 _USUAL_RATE = 60.0
 _Z = np.array([0.0, 0.0, 1.0])
 _CHUNK = 1 << 20
+_TWICE = 2  # a segment has a place and a turn
 
 
 def recognises_mvnx(path: Path, head: bytes) -> bool:
@@ -125,7 +126,7 @@ class _Reader:
         self.positions.extend(places)
         self.turns.extend(turns)
         if count:
-            check_poses(len(self.positions) // (3 * count), count)
+            check_poses(_TWICE * (len(self.positions) // (3 * count)), count)
 
     def motion(self) -> JointMotion:
         """The segments of the body.
@@ -138,13 +139,13 @@ class _Reader:
         known = [name for name in body.names if name in self.labels]
         if not count or not self.positions or body.names[body.root] not in known:
             raise ContentError("it holds no frames of a body; export it from MVN as MVNX again")
-        positions = np.array(self.positions).reshape(-1, count, 3)
+        positions = np.frombuffer(self.positions).reshape(-1, count, 3)
         if not np.isfinite(positions).any():
             raise ContentError(
                 "it has no positions of segments; export it from MVN with position and orientation"
             )
         columns = [self.labels.index(name) for name in known]
-        turns = np.array(self.turns).reshape(-1, count, 4)[:, columns][..., [1, 2, 3, 0]]
+        turns = np.frombuffer(self.turns).reshape(-1, count, 4)[:, columns][..., [1, 2, 3, 0]]
         rate = self.rate
         if not 0.1 < rate < 1e5:
             rate = _USUAL_RATE

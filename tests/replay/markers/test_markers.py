@@ -263,3 +263,10 @@ def test_a_stated_number_of_frames_is_not_believed(tmp_path: Path) -> None:
     recording = read(tmp_path, bytes(data))
     assert 60 <= len(recording) < 70
     assert any("of 65535 frames" in note for note in recording.notes)
+
+
+def test_empty_columns_count_as_poses_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("replay.bounds.MOST_POSES", 1000)
+    text = "Frame#\tTime" + "\t" * 600 + "LASI\n" + ("1\t2" + "\t" * 600 + "\n") * 20
+    with pytest.raises(InputError, match="are too many"):
+        read(tmp_path, text, "a.trc")
