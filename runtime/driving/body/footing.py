@@ -18,7 +18,7 @@ from solvers.retarget.foot_lock import FootLock, FootLockState
 from solvers.retarget.hip_shift import HipShift, HipShiftState
 from solvers.retarget.sole_pitch import ANGLES, SolePitch, SolePitchState, sole_depths
 from solvers.retarget.two_bone_ik import two_bone_turns
-from solvers.skeleton.quaternions import multiply, rotate
+from solvers.skeleton.quaternions import between, multiply, rotate
 from solvers.skeleton.tree import Tree
 
 Array = NDArray[np.float64]
@@ -27,6 +27,8 @@ Place = Callable[[Array], Array]
 
 _SHORT, _FOOT = 0.02, 0.25  # of the leg: a foot without length, and the length it is given
 _LEADS = 0.5  # of its length: a foot that leads less far forward or aside, or back, is a stump
+_LIES = 0.5  # sine of the angle below the horizon: a shin that leads down by less lies
+_STRAIGHT = 0.8  # cosine between a shin and a foot that goes straight on
 _STILL = 1e-6  # [m] a foot that is off by less is in its place
 
 
@@ -86,13 +88,15 @@ class Footing:
         self._lock = FootLock(np.array(lengths))
         ours = nodes[self._points[:, 1]] - nodes[self._points[:, 0]]
         front = rotate(about_vertical(bodies.facing), np.array([0.0, 0.0, 1.0]))
-        ours[[not _leads(way, front, leg) for way in ours]] = _FOOT * leg * front
+        self._stands_up = _stands_up(nodes, self._joints, ours)
+        lies = self._stands_up[:, 3] < 1.0
+        ours[[not _leads(way, front, leg) for way in ours] | lies] = _FOOT * leg * front
         standing = bodies.upright[self._parts[:, 1]] - bodies.upright[self._parts[:, 0]]
         self._ratio = leg / max(their_leg, 1e-9)
         self._depths = np.array(
             [
-                sole_depths(_foot_surface(bodies.tree, part, vertices, owner), way)
-                for part, way in zip(self._points, ours, strict=True)
+                sole_depths(rotate(up, _foot_surface(bodies.tree, part, vertices, owner)), way)
+                for up, part, way in zip(self._stands_up, self._points, ours, strict=True)
             ]
         ).reshape(-1, len(ANGLES))
         self._soles = SolePitch(
@@ -125,7 +129,7 @@ class Footing:
         heights = self._ratio * heights
         turns = self._soles.turns(ways, left, heights, stands, time)
         real = feet >= 0
-        given[feet[real]] = turns[real]
+        given[feet[real]] = multiply(turns[real], self._stands_up[real])
 
     def hip_shift(
         self, pose: Pose, positions: Array, performer_on_stage: Place, on_stage: Place
@@ -235,6 +239,26 @@ class Footing:
         self._lock.restore(state.lock)
         self._soles.restore(state.soles)
         self._stood = state.stood
+
+
+def _stands_up(rest: Array, legs: NDArray[np.int64], ways: Array) -> Array:
+    """The rotations (F, 4) that put feet on the floor whose legs lie at rest: of toys that sit.
+
+    Such a foot goes straight on from its shin, and its sole is the end of the leg.
+
+    Args:
+        rest: (K, 3) [m] the nodes at rest.
+        legs: (F, 3) hips, knees and ankles.
+        ways: (F, 3) [m] from the ankles to the ends of the feet.
+    """
+    found = np.tile([0.0, 0.0, 0.0, 1.0], (len(legs), 1))
+    for leg, way in enumerate(ways):
+        shin = rest[legs[leg, 2]] - rest[legs[leg, 1]]
+        both = float(np.linalg.norm(shin) * np.linalg.norm(way))
+        lies = -shin[1] < _LIES * float(np.linalg.norm(shin))
+        if lies and shin @ way > _STRAIGHT * both > 0.0:
+            found[leg] = between(shin / np.linalg.norm(shin), np.array([0.0, -1.0, 0.0]))
+    return found
 
 
 def _leads(way: Array, front: Array, leg: float) -> bool:

@@ -394,3 +394,18 @@ def test_wings_show_each_angle_of_the_arms_between_hanging_and_level_above_the_f
     edge = shown[-1]
     assert np.radians(20.0) < edge < np.radians(40.0)
     np.testing.assert_allclose(shown, edge * below / below[-1], atol=np.radians(2.0))
+
+
+def test_the_feet_of_a_toy_that_sits_go_on_straight_from_its_shins_when_it_stands() -> None:
+    figure = with_feet((0.0, 0.0, 0.08))
+    skeleton = figure.skeleton
+    rest = skeleton.rest_positions.copy()
+    for side, toe in (("L", -2), ("R", -1)):
+        for number, name in enumerate(("knee", "ankle"), 1):
+            rest[node(f"{name}.{side}")] = rest[node(f"hip.{side}")] + (0.0, 0.0, 0.3 * number)
+        rest[toe] = rest[node(f"ankle.{side}")] + (0.0, 0.0, 0.08)
+    sitting = replace(figure, skeleton=Skeleton(skeleton.names, skeleton.parents, rest))
+    places = follow(driver_of(sitting), pose())[-1].positions
+    for side, toe in (("L", -2), ("R", -1)):
+        way = places[toe] - places[node(f"ankle.{side}")]
+        assert way[1] < -0.95 * np.linalg.norm(way)
