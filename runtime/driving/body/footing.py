@@ -90,7 +90,8 @@ class Footing:
         front = rotate(about_vertical(bodies.facing), np.array([0.0, 0.0, 1.0]))
         self._stands_up = _stands_up(nodes, self._joints, ours)
         lies = self._stands_up[:, 3] < 1.0
-        ours[[not _leads(way, front, leg) for way in ours] | lies] = _FOOT * leg * front
+        leads = np.array([_leads(way, front, leg) for way in ours], dtype=np.bool_)
+        ours[lies | ~leads] = _FOOT * leg * front
         standing = bodies.upright[self._parts[:, 1]] - bodies.upright[self._parts[:, 0]]
         self._ratio = leg / max(their_leg, 1e-9)
         self._depths = np.array(
