@@ -25,6 +25,8 @@ from runtime.show.pacing import AtOnce
 from runtime.show.show import Show
 from runtime.status.progress import Progress
 
+NOBODY = "nobody"
+
 
 def perform(
     options: argparse.Namespace,
@@ -41,7 +43,7 @@ def perform(
     Args:
         options: of the command line; nothing behind this sees them.
         open_source: opens the stream, once all files are known to be possible.
-        origin: the address or name of the stream.
+        origin: the address or name of the stream; `NOBODY` where nobody performs.
         read: files that are read and must not be written, each with the name of its option.
         session: where takes are kept and played from.
         began: is called once, after the first frame was performed.
@@ -62,7 +64,8 @@ def perform(
     with source as stream:
         with collector_paused():
             characters = [load_character(name) for name in options.character]
-        if session is None and not settings.is_noticed and not _ends(stream):
+        unused = session is None or origin == NOBODY
+        if unused and not settings.is_noticed and not _ends(stream):
             messages.warn(
                 "this show has no window, file or sender, and runs until Ctrl-C: nobody sees it"
             )

@@ -57,8 +57,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Perform until the window is closed, or Ctrl-C; the session is saved then."""
-    from runtime.cli.performing import perform
+    from runtime.cli.performing import NOBODY, perform
     from runtime.session.store import SessionStore
+    from runtime.show import messages
 
     store = SessionStore(options.session)
     try:
@@ -67,8 +68,8 @@ def run(options: argparse.Namespace) -> int:
             options.drive = store.session.actors[0].drive
         if options.device is not None and is_camera(options.device):
             options.mirror = True if options.mirror is None else options.mirror
-        origin = options.device or (options.recording.name if options.recording else "nobody")
-        return perform(
+        origin = options.device or (options.recording.name if options.recording else NOBODY)
+        code = perform(
             options,
             lambda: _source(options),
             origin=origin,
@@ -79,6 +80,12 @@ def run(options: argparse.Namespace) -> int:
     except BaseException:
         store.abandon()
         raise
+    session = store.session
+    messages.announce(
+        f"{store.path}: {len(session.takes)} takes, {len(session.clips)} clips, "
+        f"{session.duration:.2f} s"
+    )
+    return code
 
 
 def _begin(show: Show, at: float, *, take: bool) -> None:

@@ -57,6 +57,7 @@ class Written:
         self._notices = notices
         self._outputs: list[list[Output]] = []
         self._kept_report: list[Kept] = []
+        self._in_session = False
         self.report = Report(settings.files.report)
         self.takes: Takes | None = None
 
@@ -65,7 +66,10 @@ class Written:
         """What lies where the show wrote files, once it is closed."""
         outputs = [output for own in self._outputs for output in own]
         files = [output.kept for output in outputs if isinstance(output, KeptFile)]
-        return [*files, *([] if self.takes is None else self.takes.kept), *self._kept_report]
+        takes = [] if self.takes is None else self.takes.kept
+        if self._in_session:  # which holds those that are whole, and tells of them itself
+            takes = [kept for kept in takes if kept.fault]
+        return [*files, *takes, *self._kept_report]
 
     def check_export(self, puppets: Sequence[Puppet]) -> None:
         """Refuse to export nodes that no driver poses, before a file is touched.
@@ -122,6 +126,7 @@ class Written:
         """
         files = self._settings.files
         usual = files.takes or files.record or Path("take.mcap")
+        self._in_session = folder is not None
         recorder = None
         if files.record is not None:
             set_aside(files.record, self._notices.warn)

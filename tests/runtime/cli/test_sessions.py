@@ -133,6 +133,17 @@ def test_a_session_holds_the_files_of_its_characters(tmp_path: Path, recording: 
     assert len(SessionStore(path).session.takes) == 2
 
 
+def test_a_session_ends_with_what_it_holds(
+    tmp_path: Path, recording: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "s.bunraku"
+    performed(path, recording, "--character", "squid")
+    said = capsys.readouterr()
+    lines = (said.out + said.err).splitlines()
+    assert any(line.endswith(": 1 takes, 1 clips, " + line.split(", ")[-1]) for line in lines)
+    assert not any(".mcap: " in line for line in lines)
+
+
 def test_a_new_session_needs_a_character(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], recording: Path
 ) -> None:
