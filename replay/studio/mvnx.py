@@ -51,7 +51,9 @@ def read_mvnx(path: Path, stated: Stated = UNSTATED) -> Recording:
     try:
         for at in range(0, len(data), _CHUNK):
             read.parser.Parse(data[at : at + _CHUNK], at + _CHUNK >= len(data))
-    except expat.ExpatError as error:
+    except ContentError:
+        raise
+    except (expat.ExpatError, LookupError, ValueError) as error:  # LookupError: of the encoding
         if not read.positions:
             raise ContentError(f"it is no XML, or damaged: {error}") from error
         read.notes.append("the file is cut off; its whole frames were read")

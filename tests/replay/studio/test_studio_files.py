@@ -185,6 +185,8 @@ def test_one_frame_of_openpose_and_its_rate(tmp_path: Path) -> None:
         (motive_table(motive_bones(), "Bone").replace("Global", "Local"), "a.csv", "are local"),
         (motive_table({k: v[:0] for k, v in motive_bones().items()}, "Bone"), "a.csv", "no frame"),
         ("<mvnx>", "a.mvnx", "no XML"),
+        (mvnx_text().replace("UTF-8", "U-infF-8"), "a.mvnx", "unknown encoding"),
+        (mvnx_text().replace("UTF-8", "Shift_JIS"), "a.mvnx", "no XML"),
         (mvnx_text(0), "a.mvnx", "no frames"),
         (mvnx_text(position=False), "a.mvnx", "position and orientation"),
         (
