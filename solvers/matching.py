@@ -87,6 +87,7 @@ class _Candidates:
     starts: NDArray[np.int64]  # (C + 1,)
     vectors: Array  # (T, 3) from the sub-tree's centre, its longest branch of length one
     sizes: Array  # (T,) 1 for extended chains at least a third as long as the longest, less below
+    tips: NDArray[np.int64]  # (T,) last nodes of the extended chains
 
 
 class TargetHierarchy:
@@ -114,6 +115,7 @@ class TargetHierarchy:
         limit: int = 20,
         source_view: ArrayLike | None = None,
         size_preference: float = 0.0,
+        leaning: Array | None = None,
     ) -> list[Match]:
         """Return matches with a performer's pose, best first.
 
@@ -124,6 +126,8 @@ class TargetHierarchy:
             limit: the most matches.
             source_view: (3, 3) as `view`, for the capture device; the identity if not given.
             size_preference: see the module.
+            leaning: (m, K) what each of the source's limbs adds to the merit where it takes a
+                branch that ends at a node; nothing if not given.
 
         Source: AniMesh, section 4.2.
         """
@@ -135,12 +139,17 @@ class TargetHierarchy:
             return []
         seen = _on_screen(source.branch_vectors(pose) / max(source.length, 1e-300), source_view)
         cosines = seen @ _on_screen(candidates.vectors, view).T
-        sizes = size_preference * candidates.sizes
+        preferred = np.broadcast_to(size_preference * candidates.sizes, cosines.shape)
+        if leaning is not None:
+            preferred = preferred + leaning[:, candidates.tips]
         # Two unfoldings can contain the same match: rank more, and keep the first of each.
         more = 2 if any(subtree.unfolding for subtree in candidates.subtrees) else 1
-        taken, columns, merits = rank_assignments(cosines + sizes, candidates.starts, more * limit)
-        preferred = np.where(columns < 0, 0.0, sizes[candidates.starts[taken, None] + columns])
-        scores = (merits - preferred.sum(axis=1)).tolist()
+        taken, columns, merits = rank_assignments(
+            cosines + preferred, candidates.starts, more * limit
+        )
+        rows = np.arange(len(preferred))
+        beside = preferred[rows, candidates.starts[taken, None] + columns]
+        scores = (merits - np.where(columns < 0, 0.0, beside).sum(axis=1)).tolist()
         matches: dict[int, Match] = {}
         for which, row, score, merit in zip(
             taken.tolist(), columns.tolist(), scores, merits.tolist(), strict=True
@@ -246,7 +255,8 @@ def _gather(
         block -= tree.positions[subtree.centre]
         vectors[first:end] = block / max(np.linalg.norm(block, axis=1).max(), 1e-300)
     sizes = np.minimum(3.0 * lengths / max(lengths.max(initial=0.0), 1e-300), 1.0)
-    return _Candidates(tuple(chosen), starts, vectors, sizes)
+    tips = np.array([(branch.chain + branch.extension)[-1] for branch in flat], dtype=np.int64)
+    return _Candidates(tuple(chosen), starts, vectors, sizes, tips)
 
 
 def _largest(subtree: SubTree) -> SubTree:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from devices.errors import InputError
 from runtime.driving.choices import Choices
 from runtime.driving.mapping import Drive, Mapping
+from runtime.driving.matching.match_guard import MatchGuard
 from runtime.driving.performer import Performer, Rest
 from runtime.driving.polyline_driver import STRAIGHT_ON
 from runtime.puppet.puppet import Puppet
@@ -49,7 +50,12 @@ class MappingChoice:
         self._hierarchy.rank(source, STRAIGHT_ON, limit=1)  # so that no frame waits for a compiler
 
     def of_pose(
-        self, hysteresis: MatchHysteresis, positions: Array, time: float, view: Array
+        self,
+        hysteresis: MatchHysteresis,
+        positions: Array,
+        time: float,
+        view: Array,
+        guard: MatchGuard | None = None,
     ) -> Mapping:
         """Return the mapping for a pose.
 
@@ -58,19 +64,19 @@ class MappingChoice:
             positions: (J, 3) [m] the performer's joints.
             time: [s].
             view: (3, 3) rotation from the stage to the camera.
+            guard: ranks the matches by anatomy too; None for the screen alone.
 
         Raises:
             InputError: there is no match of the rank that was chosen.
         """
         if self._by_hand is not None:
             return self._by_hand
-        ranked = self._hierarchy.rank(
-            self._source,
-            view,
-            positions[self._performer.joints],
-            limit=CANDIDATES + self._choices.rank,
-            size_preference=SIZE_PREFERENCE,
-        )
+        pose, wanted = positions[self._performer.joints], CANDIDATES + self._choices.rank
+        ranked = guard.rank(pose, view, wanted) if guard is not None else []
+        if not ranked:
+            ranked = self._hierarchy.rank(
+                self._source, view, pose, limit=wanted, size_preference=SIZE_PREFERENCE
+            )
         match = hysteresis.update(ranked, time)
         if len(ranked) < self._choices.rank or match is None:
             raise InputError(
@@ -80,7 +86,11 @@ class MappingChoice:
         return self._mapping_of(match)
 
     def best_of(
-        self, states: Sequence[Rest], view: Array, of_anatomy: Mapping | None = None
+        self,
+        states: Sequence[Rest],
+        view: Array,
+        of_anatomy: Mapping | None = None,
+        guard: MatchGuard | None = None,
     ) -> tuple[Mapping, Rest, MatchHysteresis]:
         """Return the rest state that is most like the puppet, its mapping and its hysteresis.
 
@@ -89,6 +99,7 @@ class MappingChoice:
             view: (3, 3) rotation from the stage to the camera.
             of_anatomy: a mapping in place of matches; a limb may then point to the other side of
                 the screen, as one that is driven by the performer's limb of the other side does.
+            guard: as of `of_pose`.
 
         Raises:
             InputError: there is no match of the rank that was chosen.
@@ -96,7 +107,7 @@ class MappingChoice:
         choices = []
         for state in states:  # each by itself: no state waits for the one before
             hysteresis = MatchHysteresis(self._choices.rank - 1)
-            mapping = of_anatomy or self.of_pose(hysteresis, state.positions, 0.0, view)
+            mapping = of_anatomy or self.of_pose(hysteresis, state.positions, 0.0, view, guard)
             choices.append((mapping, state, hysteresis))
         seen = (STRAIGHT_ON,) if of_anatomy is None else (STRAIGHT_ON, _MIRRORED)
         worths = [self._worth(mapping, state, view, seen) for mapping, state, _ in choices]

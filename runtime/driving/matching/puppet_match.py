@@ -16,6 +16,7 @@ from runtime.driving.drivers import DriverFactory, best_driver, matched_driver
 from runtime.driving.mapping import Mapping
 from runtime.driving.matching.hand_mapping import mapping_of_hands
 from runtime.driving.matching.mapping_choice import MappingChoice
+from runtime.driving.matching.match_guard import MatchGuard
 from runtime.driving.pairing import Pairing
 from runtime.driving.performer import Performer, Pose, Rest
 from runtime.driving.reach import Reach, reach_of
@@ -92,6 +93,8 @@ class PuppetMatch:
         self._of_hands = mapping_of_hands(self._pairing()) if make_driver is best_driver else None
         self.matching = True
         self._driver = self._make(make_driver)
+        guarded = make_driver is best_driver and isinstance(self._driver, MappedDriver)
+        self._anatomy = MatchGuard(performer, source, puppet) if guarded else None
         self._proposal: Driver | None = None
         puppet.drive_with(self._driver)
 
@@ -176,7 +179,9 @@ class PuppetMatch:
         before = shown.mapping.drives
         mapping = self._of_anatomy
         if mapping is None:
-            mapping = self._mapping_choice.of_pose(self._hysteresis, positions, time, view)
+            mapping = self._mapping_choice.of_pose(
+                self._hysteresis, positions, time, view, self._guard
+            )
         shown.show(mapping, view)
         return mapping.drives != before
 
@@ -232,7 +237,7 @@ class PuppetMatch:
         self._clip, rest = clip, states[0]
         if isinstance(self._driver, MappedDriver):
             mapping, rest, self._hysteresis = self._mapping_choice.best_of(
-                states, view, self._of_anatomy
+                states, view, self._of_anatomy, self._guard
             )
             self._driver.show(mapping, view)
         self.perform(rest, view)
@@ -336,6 +341,11 @@ class PuppetMatch:
         """What hands drive, where neither the user chose a mapping nor stepped to a match."""
         chosen = self._by_hand is not None or self._make_driver is not best_driver
         return None if chosen else self._of_hands
+
+    @property
+    def _guard(self) -> MatchGuard | None:
+        """What ranks the matches by anatomy too, where the driver that suits was asked for."""
+        return self._anatomy if self._make_usual is best_driver else None
 
     def _pairing(self) -> Pairing:
         puppet, performer = self.puppet, self._performer
