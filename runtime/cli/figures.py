@@ -1,4 +1,4 @@
-"""`bunraku figures`: draws the paper's figures on squash and stretch with our own solvers."""
+"""`bunraku figures`: draws the pictures of the documents: a paper's figures, or the window."""
 
 from __future__ import annotations
 
@@ -8,28 +8,39 @@ from pathlib import Path
 from runtime.cli.options.arguments import size
 from runtime.cli.options.show_options import add_character_option
 
-HELP = "draw the paper's figures on squash and stretch"
+HELP = "draw the paper's figures on squash and stretch, or pictures of the window"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments and options."""
     parser.add_argument("folder", type=Path, metavar="DIR", help="folder for the pictures")
     parser.add_argument(
+        "--of",
+        choices=("paper", "window"),
+        default="paper",
+        help="what is drawn: the paper's figures 5 to 7 (default), or the window at work",
+    )
+    parser.add_argument(
         "--size",
         type=size,
-        default=(1500, 420),
         metavar="WxH",
-        help="width and height of a row in pixels (default 1500x420)",
+        help="width and height in pixels of a row of the paper's figures (default 1500x420), or of "
+        "the window (default 1280x720)",
     )
     add_character_option(parser, required=False)
 
 
 def run(options: argparse.Namespace) -> int:
-    """Write figure-5.png, figure-6.png and figure-7.png; print their figures in numbers."""
+    """Write the pictures; print what each is, or its figures in numbers."""
+    if options.of == "window":
+        from runtime.figures.window import draw_window
+
+        print("\n".join(draw_window(options.folder, options.size or (1280, 720))))
+        return 0
     from runtime.characters.open_character import load_character
     from runtime.figures.paper_figures import draw_figures
 
     characters = [load_character(name) for name in options.character or ["cactus"]]
-    for line in draw_figures(options.folder, characters, options.size):
+    for line in draw_figures(options.folder, characters, options.size or (1500, 420)):
         print(line)
     return 0

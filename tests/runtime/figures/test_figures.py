@@ -145,3 +145,15 @@ def test_a_character_with_nothing_between_foot_and_top_is_refused(
     error = capsys.readouterr().err
     assert error.count("\n") == 1
     assert "nothing is left between its foot and its top" in error
+
+
+def test_the_window_is_drawn_for_the_documents(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["figures", str(tmp_path), "--of", "window", "--size", "320x180"]) == 0
+    names = ("matching", "performing", "session")
+    pictures = [np.asarray(Image.open(tmp_path / f"{name}.png").convert("RGB")) for name in names]
+    assert all(picture.shape == (180, 320, 3) for picture in pictures)
+    assert (pictures[0] != pictures[1]).any()
+    assert (pictures[1] != pictures[2]).any()
+    assert len(capsys.readouterr().out.splitlines()) == 3
