@@ -21,12 +21,12 @@ from runtime.show.open_stream import play
 from runtime.show.settings import MatchSettings, ShowSettings
 from runtime.show.show import Show
 
-COLOURS = 256
+QUALITY = 90  # of 100
 LAYOUTS = 6  # times that the panel is laid out before it is drawn: it finds its size
 
 
 def draw_window(folder: Path, size: tuple[int, int]) -> list[str]:
-    """Write matching.png, performing.png and session.png; return a line for each.
+    """Write matching.jpg, performing.jpg and session.jpg; return a line for each.
 
     Args:
         folder: where they are written; made if it is not there.
@@ -39,7 +39,7 @@ def draw_window(folder: Path, size: tuple[int, int]) -> list[str]:
     context = headless_context()
     try:
         return [
-            _draw(context, folder / f"{name}.png", size, stage)
+            _draw(context, folder / f"{name}.jpg", size, stage)
             for name, stage in (
                 ("matching", _match),
                 ("performing", _perform),
@@ -72,9 +72,8 @@ def _draw(
             panel.close()
             target.release()
     picture = Image.frombytes("RGB", size, read).transpose(Image.Transpose.FLIP_TOP_BOTTOM)
-    picture = picture.quantize(COLOURS)  # a fourth of the size, and no difference to the eye
     with whole_file(path) as partial:
-        picture.save(partial, format="PNG", optimize=True)
+        picture.save(partial, format="JPEG", quality=QUALITY)
     return f"{path}: the window, {size[0]}x{size[1]}"
 
 

@@ -152,7 +152,7 @@ def test_the_window_is_drawn_for_the_documents(
 ) -> None:
     assert main(["figures", str(tmp_path), "--of", "window", "--size", "320x180"]) == 0
     names = ("matching", "performing", "session")
-    pictures = [np.asarray(Image.open(tmp_path / f"{name}.png").convert("RGB")) for name in names]
+    pictures = [np.asarray(Image.open(tmp_path / f"{name}.jpg").convert("RGB")) for name in names]
     assert all(picture.shape == (180, 320, 3) for picture in pictures)
     assert (pictures[0] != pictures[1]).any()
     assert (pictures[1] != pictures[2]).any()
