@@ -158,6 +158,7 @@ def test_only_the_renderer_and_the_window_touch_graphics() -> None:
     }
     # A show passes a context on and names its type; it calls nothing of moderngl.
     named = (
+        "figures/window",
         "show/opening/display",
         "show/opening/opened_show",
         "show/scene",
