@@ -135,6 +135,10 @@ def _full_screen(controls: ShowControls, on: bool) -> None:
     controls.view.full_screen = on
 
 
+def _audience(controls: ShowControls, on: bool) -> None:
+    controls.view.audience = on
+
+
 def _front(controls: ShowControls) -> None:
     if controls.scene is not None:
         controls.scene.view_from_front()
@@ -258,6 +262,12 @@ ACTIONS: Mapping[str, Action] = {
         "fill the screen with the window, or not",
         lambda controls: controls.view.full_screen,
         _full_screen,
+    ),
+    "audience": switch(
+        "Audience",
+        "a second window with the show alone, on another screen if there is one, or not",
+        lambda controls: controls.view.audience,
+        _audience,
     ),
     **{
         name: action

@@ -8,6 +8,7 @@ from runtime.control.action import Kind
 from runtime.control.actions import ACTIONS, press
 from runtime.control.show_controls import ShowControls
 from runtime.control.window import Event, KeyPressed, Resized, Window
+from runtime.render.stage import Stage
 from runtime.show.scene import Scene
 
 if TYPE_CHECKING:
@@ -51,6 +52,7 @@ KEYS = {
     "d": "sliders",
     "?": "help",
     "f11": "full-screen",
+    "f9": "audience",
     "u": "undo",
     "y": "redo",
     "a": "rehearse",
@@ -87,6 +89,21 @@ class Overlay(Protocol):
         ...
 
 
+class SecondWindow(Protocol):
+    """A window that shows the picture to others."""
+
+    on: bool
+
+    @property
+    def should_close(self) -> bool:
+        """Whether its user asked to close it."""
+        ...
+
+    def show(self, stage: Stage) -> None:
+        """Show a stage's picture."""
+        ...
+
+
 class WindowControls:
     """Runs the show by the window's keys and mouse.
 
@@ -95,15 +112,22 @@ class WindowControls:
         scene: the picture in it; the mouse moves its camera.
         controls: what the actions of the keys change.
         panel: is drawn over the picture, and takes input first; None without one.
+        audience: the second window; None where there can be none.
     """
 
     def __init__(
-        self, window: Window, scene: Scene, controls: ShowControls, panel: Overlay | None = None
+        self,
+        window: Window,
+        scene: Scene,
+        controls: ShowControls,
+        panel: Overlay | None = None,
+        audience: SecondWindow | None = None,
     ) -> None:
         self._window = window
         self._scene = scene
         self._controls = controls
         self._panel = panel
+        self._audience = audience
         self._camera = window.camera = scene.camera
 
     def serve(self) -> None:
@@ -118,13 +142,28 @@ class WindowControls:
         if self._window.full_screen is not self._controls.view.full_screen:
             self._window.full_screen = self._controls.view.full_screen
             self._controls.view.full_screen = self._window.full_screen  # there may be no screen
+        self._serve_audience()
 
     def present(self) -> None:
         """Show the newest picture in the window."""
         self._scene.stage.show(self._window.framebuffer)
         if self._panel is not None:
             self._panel.draw(self._window.framebuffer)
+        if self._audience is not None and self._audience.on:
+            self._scene.draw_for_audience()
+            self._audience.show(self._scene.stage)
         self._window.swap()
+
+    def _serve_audience(self) -> None:
+        """Open and close the audience's window as the view says, or as its user asks."""
+        view = self._controls.view
+        if self._audience is None:
+            return
+        if self._audience.should_close:
+            view.audience = False
+        if self._audience.on is not view.audience:
+            self._audience.on = view.audience
+            view.audience = self._audience.on
 
     def _handle(self, event: Event) -> None:
         if isinstance(event, Resized):

@@ -25,12 +25,14 @@ class View:
         sliders: whether the column of sliders and switches is shown beside the panel.
         help: whether the list of all keys is shown.
         full_screen: whether the window fills the screen.
+        audience: whether a second window shows the show alone.
     """
 
     panel: bool = True
     sliders: bool = False
     help: bool = False
     full_screen: bool = False
+    audience: bool = False
 
 
 @dataclass(slots=True, eq=False)

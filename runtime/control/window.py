@@ -143,7 +143,7 @@ class Window:
         self._cursor = glfw.get_cursor_pos(self.handle)
         self._dragging: int | None = None
         glfw.swap_interval(1)
-        glfw.set_key_callback(self.handle, self._on_key)
+        glfw.set_key_callback(self.handle, self.on_key)
         glfw.set_char_callback(self.handle, self._on_letter)
         glfw.set_mouse_button_callback(self.handle, self._on_button)
         glfw.set_cursor_pos_callback(self.handle, self._on_cursor)
@@ -162,6 +162,12 @@ class Window:
         return self.context.screen
 
     @property
+    def monitor(self) -> Any:
+        """The screen that most of the window is on; None without any."""
+        place = (*glfw.get_window_pos(self.handle), *glfw.get_window_size(self.handle))
+        return _monitor_under(place)
+
+    @property
     def should_close(self) -> bool:
         """Whether the user asked to close the window."""
         return bool(glfw.window_should_close(self.handle))
@@ -175,7 +181,7 @@ class Window:
     def full_screen(self, on: bool) -> None:
         if on and self._windowed is None:
             place = (*glfw.get_window_pos(self.handle), *glfw.get_window_size(self.handle))
-            monitor = _monitor_under(place)
+            monitor = self.monitor
             if monitor is None:
                 return
             mode = glfw.get_video_mode(monitor)
@@ -215,7 +221,8 @@ class Window:
     def __exit__(self, *exc: object) -> None:
         self.close()
 
-    def _on_key(self, _: object, key: int, scancode: int, action: int, mods: int) -> None:
+    def on_key(self, _: object, key: int, scancode: int, action: int, mods: int) -> None:
+        """Take a key from glfw, of this window or another."""
         name = KEY_NAMES.get(key) or glfw.get_key_name(key, scancode)
         if not name:
             return

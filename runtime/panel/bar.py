@@ -24,6 +24,7 @@ ICONS = {
     "keep-match": icons.ICON_FA_ROTATE_LEFT,
     "sliders": icons.ICON_FA_SLIDERS,
     "full-screen": icons.ICON_FA_EXPAND,
+    "audience": icons.ICON_FA_DISPLAY,
     "panel": icons.ICON_FA_EYE_SLASH,
     "help": icons.ICON_FA_CIRCLE_QUESTION,
 }
@@ -39,10 +40,11 @@ WORDED = (
     "sliders",
     "blackout",
     "panel",
+    "audience",
     "full-screen",
 )
 """The buttons with words, as long as there is room for them: the first ones first."""
-OF_WINDOW = ("sliders", "full-screen", "panel", "help")
+OF_WINDOW = ("sliders", "audience", "full-screen", "panel", "help")
 TIME = 170.0  # [px] width of the line of time in a picture of the usual height
 
 

@@ -42,6 +42,7 @@ COLUMNS: tuple[dict[str, tuple[str, ...]], ...] = (
             "front",
             "chains",
             "full-screen",
+            "audience",
             "blackout",
             "in-place",
         ),

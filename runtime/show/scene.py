@@ -175,6 +175,13 @@ class Scene:
         """Draw once more what was drawn last."""
         self.draw(self._pose)
 
+    def draw_for_audience(self) -> None:
+        """Draw once more what was drawn last: whole, without highlights and without the inset."""
+        kept = self.taken, self.highlights, self._inset
+        self.taken, self.highlights, self._inset = NOTHING_TAKEN, False, None
+        self.redraw()
+        self.taken, self.highlights, self._inset = kept
+
     def draw(self, pose: Pose | None) -> None:
         """Draw the uploaded puppets with their highlights, and the performer in the inset."""
         self._pose = pose

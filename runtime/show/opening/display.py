@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
 from devices.skeleton import Skeleton
+from runtime.control.audience_window import AudienceWindow
 from runtime.control.keys import WindowControls
 from runtime.control.show_controls import ShowControls
 from runtime.control.window import Window, leave_windows
@@ -106,7 +107,9 @@ class Display:
         panel = Panel(self.window.context, controls, status, clock=self._clock)
         self._closing.callback(panel.close)
         self.window.taker = panel.gui
-        return WindowControls(self.window, scene, controls, panel)
+        audience = AudienceWindow(self.window, transparent=self._settings.transparent)
+        self._closing.callback(audience.close)
+        return WindowControls(self.window, scene, controls, panel, audience)
 
     def _open_window(self) -> Window | None:
         settings = self._settings

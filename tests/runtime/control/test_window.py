@@ -47,8 +47,8 @@ def test_the_window_shows_the_picture_that_is_read(window: Window) -> None:
 
 def test_keys_and_resizing_become_events(window: Window) -> None:
     window.poll()
-    window._on_key(None, glfw.KEY_SPACE, 0, glfw.PRESS, glfw.MOD_SHIFT)
-    window._on_key(None, glfw.KEY_SPACE, 0, glfw.RELEASE, 0)
+    window.on_key(None, glfw.KEY_SPACE, 0, glfw.PRESS, glfw.MOD_SHIFT)
+    window.on_key(None, glfw.KEY_SPACE, 0, glfw.RELEASE, 0)
     window._on_resize(None, 200, 100)
     assert window.poll() == [
         KeyPressed("space", shift=True),
