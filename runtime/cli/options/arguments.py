@@ -16,6 +16,26 @@ MOST_SECONDS = 3600.0  # of a countdown
 MOST_MOMENT = 1e6  # [s] of a session
 
 
+class Once(argparse.Action):
+    """Takes the value of an option, and refuses a second one: the first would be lost in silence."""
+
+    def __call__(
+        self,
+        parser: argparse.ArgumentParser,
+        namespace: argparse.Namespace,
+        values: object,
+        option_string: str | None = None,
+    ) -> None:
+        """Set the value.
+
+        Raises:
+            ArgumentError: the option was given before.
+        """
+        if getattr(namespace, self.dest) is not self.default:
+            raise argparse.ArgumentError(self, "is given twice; one file of a kind can be written")
+        setattr(namespace, self.dest, values)
+
+
 def size(text: str) -> tuple[int, int]:
     """Width and height of a picture [px], from ``WxH``."""
     width, _, height = text.lower().partition("x")

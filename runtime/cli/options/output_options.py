@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from runtime.cli.options.arguments import host_port, positive
+from runtime.cli.options.arguments import Once, host_port, positive
 from runtime.show.settings import FileSettings, SenderSettings
 
 
@@ -38,6 +38,7 @@ def add_file_options(parser: argparse.ArgumentParser) -> None:
     keep = parser.add_argument_group("files to write")
     keep.add_argument(
         "--video",
+        action=Once,
         type=Path,
         metavar="OUT.mp4",
         help="the pictures as a video: mp4, m4v, mov, mkv or webm",
@@ -49,18 +50,31 @@ def add_file_options(parser: argparse.ArgumentParser) -> None:
         metavar="X",
         help="pictures per second of videos and cameras, at most (default 60; demo 30)",
     )
-    keep.add_argument("--frames", type=Path, metavar="DIR", help="a PNG of each frame")
+    keep.add_argument("--frames", action=Once, type=Path, metavar="DIR", help="a PNG of each frame")
     keep.add_argument(
-        "--cache", type=Path, metavar="OUT.pc2", help="the deformed vertices of each frame"
+        "--cache",
+        action=Once,
+        type=Path,
+        metavar="OUT.pc2",
+        help="the deformed vertices of each frame",
     )
     keep.add_argument(
-        "--report", type=Path, metavar="OUT.json", help="match, times and quality in figures"
+        "--report",
+        action=Once,
+        type=Path,
+        metavar="OUT.json",
+        help="match, times and quality in figures",
     )
     keep.add_argument(
-        "--record", type=Path, metavar="OUT.mcap", help="the performer's frames as they arrived"
+        "--record",
+        action=Once,
+        type=Path,
+        metavar="OUT.mcap",
+        help="the performer's frames as they arrived",
     )
     keep.add_argument(
         "--export",
+        action=Once,
         type=Path,
         metavar="OUT.{glb,usdc,usda,bvh}",
         help="the performed character, for other programs",
