@@ -17,7 +17,7 @@ MOST_MOMENT = 1e6  # [s] of a session
 
 
 class Once(argparse.Action):
-    """Takes the value of an option, and refuses a second one: the first would be lost in silence."""
+    """Takes an option once: of two values, the first would be lost in silence."""
 
     def __call__(
         self,
