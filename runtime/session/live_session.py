@@ -154,6 +154,7 @@ class LiveSession:
         for layers in self._recorded:
             layers.start()
         self.transport.record()
+        self._tell(f"recording {self._next_name}")
         return True
 
     def running(self, recording: str) -> None:
@@ -185,8 +186,6 @@ class LiveSession:
             self._tell("nobody has performed yet")
             return
         self._add(made, self.transport.position, "")
-        seconds = max(each.duration for _, each in made)
-        self._tell(f"kept the last {seconds:.0f} s as a take")
 
     def drop_last(self) -> None:
         """Take the clips of the newest take away, so that it can be performed again."""
@@ -203,13 +202,21 @@ class LiveSession:
         self.transport.rehearse()
         self.transport.go_to(start)
 
+    @property
+    def _next_name(self) -> str:
+        """What the next take is called."""
+        return f"take {next_id(self.session.takes)}"
+
     def _add(
         self, made: Sequence[tuple[ActorLayers, Performance]], start: float, recording: str
     ) -> None:
         """Add a take and a clip for each actor, as one step."""
+        if not made:
+            self._tell("the take holds no frame: it is not kept")
+            return
         session, speed = self.session, 1.0 / self.transport.speed
         self._last = []
-        name = f"take {next_id(session.takes)}"
+        name = self._next_name
         for layers, performance in made:
             one = self._staged[self._layers.index(layers)]
             parts = tuple(one.parts())
@@ -224,6 +231,8 @@ class LiveSession:
         if self._last and session.punch is not None:
             session = self._punched(session)
         self.edit(session, f"record {name}")
+        seconds = max(performance.duration for _, performance in made)
+        self._tell(f"kept {name}: {seconds:.1f} s")
 
     def _punched(self, session: Session) -> Session:
         """The session with its newest clips cut to the range that is to be recorded."""

@@ -136,7 +136,7 @@ class Written:
             self._stream,
             usual if folder is None else folder / usual.name,
             self._open_recorder,
-            tell=self._notices.tell,
+            tell=self._notices.tell if folder is None else lambda _: None,  # a session tells it
             warn=self._notices.warn,
             whole=recorder,
             waits=loses_no_frame(self._source),

@@ -203,3 +203,15 @@ def test_a_kiosk_plays_while_nobody_is_there(tmp_path: Path) -> None:
     assert set(modes[95:count]) == {Mode.PLAYING}
     assert set(modes[count + 2 : count + 58]) == {Mode.REHEARSING}
     assert modes[-1] is Mode.PLAYING
+
+
+def test_a_take_without_a_frame_is_told_and_not_kept(tmp_path: Path) -> None:
+    with open_show(tmp_path / "s.bunraku") as show:
+        ticks(show, 2)
+        press("record", show.controls)
+        press("record", show.controls)
+        session = show.controls.session
+        assert session is not None
+        assert session.session.takes == ()
+        said = [notice.text for notice in show.controls.notices.current]
+        assert "the take holds no frame: it is not kept" in said
