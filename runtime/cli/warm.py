@@ -38,7 +38,10 @@ from solvers.deform.skinning import SkinnedSurface
 from solvers.kernels.cache import count_compiled, has_list, remove_unused, save_list
 from solvers.linear.block_factor import BlockFactor
 from solvers.linear.nested_dissection import dissect
+from solvers.retarget.limb_posing import lift_segments
 from solvers.retarget.two_bone_ik import two_bone_turns
+from solvers.skeleton.layers import LayeredNodes, LayerFrame
+from solvers.skeleton.tree import Tree
 from solvers.squash_stretch import SquashStretchSolver
 from solvers.surface.heat_weights import skin_of_heat
 
@@ -139,6 +142,21 @@ def use_solvers() -> None:
     _factor_in_double()
     _skin(x, faces)
     two_bone_turns(np.eye(3)[None], np.ones((1, 3)), np.ones((1, 3)))  # where a foot slides only
+    unturned = np.tile([0.0, 0.0, 0.0, 1.0], (2, 1))
+    link, joints, aside = np.array([0]), np.array([0, 1]), np.array([1.0, 0.0, 0.0])
+    lift_segments(x[:2], unturned, link, joints, 0.5, aside, unturned)  # where wings hang only
+    _stack_layers(Tree(np.array([-1, 0]), x[:2]))
+
+
+def _stack_layers(tree: Tree) -> None:
+    """Put layers of both kinds on two nodes, as a session does."""
+    layered, nodes = LayeredNodes(tree), np.arange(len(tree))
+    turns = np.tile(np.array([0.0, 0.0, 0.0, 1.0], np.float32), (len(tree), 1))
+    shifts = np.zeros((len(tree), 3), np.float32)
+    frame = LayerFrame(nodes, (turns, turns), (shifts, shifts))
+    layered.override(frame, 0.5)
+    layered.add(frame, 0.5)
+    layered.local(*layered.world())
 
 
 def _skin(points: NDArray[np.float64], faces: NDArray[np.int64]) -> None:

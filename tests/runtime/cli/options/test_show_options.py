@@ -115,7 +115,7 @@ def test_options_that_contradict_each_other_are_refused_by_their_names(
 def test_no_field_of_the_settings_is_forgotten() -> None:
     """A new setting is either set by an option, and tried above, or is for the library alone."""
     for_the_library = {
-        ShowSettings: {"pictures"},
+        ShowSettings: {"pictures", "kiosk"},  # `bunraku session` alone has a kiosk
         MatchSettings: {"rehearse"},
         FileSettings: {"takes"},
     }
