@@ -35,35 +35,61 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> int:
     """Do the edits, all or none; print what the session holds then."""
-    import shutil
-
     from runtime.cli.sessions.contents import lines_of
-    from runtime.output.files.whole_file import check_suffix, whole_file
-    from runtime.session.archive import SUFFIX
     from runtime.session.folder import Opened
-    from runtime.session.store import SessionStore
 
     path: Path = options.session
     if not path.is_file():
         raise InputError(f"there is no session {path}; `bunraku session` makes one")
     edits = [] if options.script is None else _read(options.script)
-    if options.out is not None:
-        check_suffix(options.out, (SUFFIX,))
-        with whole_file(options.out) as partial:
-            shutil.copyfile(path, partial)
+    where = [f"edit {number} of {options.script}" for number in range(1, len(edits) + 1)]
+    if options.out is None:
+        session, notes = _edit(path, edits, where)
+    else:
         path = options.out
+        _copy(options.session, path)
+        try:
+            session, notes = _edit(path, edits, where)
+        except BaseException:
+            path.unlink(missing_ok=True)
+            raise
+    print("\n".join(lines_of(path, Opened(session, tuple(notes)))))
+    return 0
+
+
+def _copy(path: Path, out: Path) -> None:
+    """Copy a session to a file that is not there yet.
+
+    Raises:
+        InputError: it is there, cannot be written, or is no name of a session.
+    """
+    import shutil
+
+    from runtime.output.files.whole_file import check_suffix, whole_file
+    from runtime.session.archive import SUFFIX
+
+    check_suffix(out, (SUFFIX,))
+    if out.exists():
+        raise InputError(f"{out} is there already; give --out another name")
+    with whole_file(out) as partial:
+        shutil.copyfile(path, partial)
+
+
+def _edit(path: Path, edits: list[dict[str, Any]], where: list[str]) -> tuple[Session, list[str]]:
+    """Edit a session's file; return the session, and what was lost or recovered."""
+    from runtime.session.store import SessionStore
+
     store = SessionStore(path)
     try:
         session = store.session
-        for number, edit in enumerate(edits, 1):
-            session = _edited(session, edit, f"edit {number} of {options.script}")
+        for edit, place in zip(edits, where, strict=True):
+            session = _edited(session, edit, place)
         store.versions.do(session, "edit")
         store.close()
     except BaseException:
         store.abandon()
         raise
-    print("\n".join(lines_of(path, Opened(session, tuple(store.notes)))))
-    return 0
+    return session, store.notes
 
 
 def _read(path: Path) -> list[dict[str, Any]]:
@@ -85,6 +111,7 @@ def _edited(session: Session, edit: dict[str, Any], where: str) -> Session:
     Raises:
         InputError: it names no edit, has other fields than the edit, or cannot be done.
     """
+    from runtime.session.codec import as_json, from_json
     from runtime.session.edits import EDITS
 
     name = edit.get("edit")
@@ -101,8 +128,11 @@ def _edited(session: Session, edit: dict[str, Any], where: str) -> Session:
     values = [
         tuple(value) if isinstance(value := given[field], list) else value for field in fields
     ]
+    performances = {take.performance.key: take.performance for take in session.takes}
     try:
-        return EDITS[name](session, *values)
+        edited = EDITS[name](session, *values)
+        # Read as a file is, so that no value of a wrong kind reaches one.
+        return from_json(as_json(edited), performances.__getitem__)
     except InputError as error:
         raise InputError(f"{where}: {error}") from error
     except (TypeError, ValueError, AttributeError, OverflowError) as error:

@@ -76,6 +76,7 @@ def run(options: argparse.Namespace) -> int:
             read=[("--recording", options.recording)] if options.recording else [],
             session=store,
             began=lambda show: _begin(show, options.at, take=options.take),
+            kiosk=options.kiosk,
         )
     except BaseException:
         store.abandon()

@@ -11,7 +11,9 @@ from pygltflib import GLTF2
 
 from replay.builtin import builtin_recording
 from replay.joint_table import write_joint_table
+from replay.recorder import Recorder
 from runtime.cli.command_line import main
+from runtime.session.nobody import nobody_for
 from runtime.session.store import SessionStore
 from tests.runtime.output.files.test_point_cache import read_pc2
 
@@ -93,6 +95,9 @@ def test_edits_are_done_in_order_and_written_elsewhere(saved: Path, tmp_path: Pa
         ({"edit": "weight", "clip": 1, "weight": 7.0}, "weight is 7.0"),
         ({"edit": "speed", "clip": 1, "speed": "fast"}, "wrong kind"),
         ({"edit": "move", "clip": [1], "start": None}, "wrong kind"),
+        ({"edit": "mute", "clip": 1, "on": 7}, "neither true nor false"),
+        ({"edit": "mark", "time": float("nan"), "name": "here"}, "expected a number"),
+        ({"edit": "limit", "clip": 1, "nodes": ["tail"]}, "expected a whole number"),
     ],
 )
 def test_a_wrong_edit_is_refused_in_one_line(
@@ -102,6 +107,18 @@ def test_a_wrong_edit_is_refused_in_one_line(
     error = capsys.readouterr().err.strip().splitlines()
     assert len(error) == 1
     assert says in error[0]
+    assert not (tmp_path / "t.bunraku").exists()
+    assert main(["info", str(saved)]) == 0
+
+
+def test_an_edited_session_replaces_no_file(
+    saved: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "t.bunraku"
+    out.write_bytes(b"somebody's")
+    assert edited(saved, out, {"edit": "mute", "clip": 1, "on": True}) == 2
+    assert "is there already" in capsys.readouterr().err
+    assert out.read_bytes() == b"somebody's"
 
 
 def test_render_gives_the_same_bytes_from_any_moment_on(saved: Path, tmp_path: Path) -> None:
@@ -151,3 +168,20 @@ def test_a_new_session_needs_a_character(
     assert main(["session", str(tmp_path / "s.bunraku"), *options]) == 2
     assert "give it a --character" in capsys.readouterr().err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_kiosk_plays_the_session_while_nobody_is_there(saved: Path, tmp_path: Path) -> None:
+    nobody = nobody_for(1.0, 30.0)
+    alone = tmp_path / "nobody.mcap"
+    with Recorder(alone, nobody.skeleton, tell=print) as recorder:
+        for number in range(len(nobody)):
+            recorder.write(nobody.frame(number))
+    moved = []
+    for number, options in enumerate(([], ["--kiosk", "0.2"])):
+        path, cache = tmp_path / f"{number}.bunraku", tmp_path / f"{number}.pc2"
+        path.write_bytes(saved.read_bytes())
+        given = ["--recording", str(alone), "--headless", "--fast", "--cache", str(cache)]
+        assert main(["session", str(path), *given, *options]) == 0
+        moved.append(float(np.ptp(read_pc2(cache)[1], axis=0).max()))
+    assert moved[0] == 0.0
+    assert moved[1] > 0.05
