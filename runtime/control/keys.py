@@ -60,6 +60,7 @@ KEYS = {
     "delete": "retake",
     "f2": "save",
     "f3": "loop",
+    "f4": "half-speed",
     "escape": "leave",
 }
 """The action of each key."""

@@ -24,8 +24,14 @@ def _with_session(do: Callable[[LiveSession], None]) -> Do:
     return press
 
 
-def _rehearse(session: LiveSession) -> None:
-    session.transport.rehearse()
+def _rehearse(controls: ShowControls) -> None:
+    session = controls.session
+    if session is None:
+        controls.notices.show(NO_SESSION)
+    elif session.recording:
+        record_into(session, controls.takes, False)
+    else:
+        session.transport.rehearse()
 
 
 def _retake(controls: ShowControls) -> None:
@@ -37,6 +43,15 @@ def _retake(controls: ShowControls) -> None:
         record_into(session, controls.takes, True)
 
 
+def _half_speed(controls: ShowControls, on: bool) -> None:
+    if controls.session is None:
+        controls.notices.show(NO_SESSION)
+    elif controls.session.recording:
+        controls.notices.show("the speed stays as it is until the take has ended")
+    else:
+        controls.session.transport.speed = 0.5 if on else 1.0
+
+
 def _loop(controls: ShowControls, on: bool) -> None:
     if controls.playback is not None:
         controls.playback.loop = on
@@ -46,7 +61,7 @@ SESSION_ACTIONS: Mapping[str, Action] = {
     "rehearse": Action(
         "Rehearse",
         "stop: the performer moves the characters again (a session)",
-        press=_with_session(_rehearse),
+        press=_rehearse,
     ),
     "retake": Action(
         "Retake", "take the newest take away and record it again (a session)", press=_retake
@@ -64,6 +79,12 @@ SESSION_ACTIONS: Mapping[str, Action] = {
     ),
     "save": Action(
         "Save", "write the session to its file", press=_with_session(lambda s: s.save())
+    ),
+    "half-speed": switch(
+        "Half speed",
+        "let the session's time go by at half speed, also while a take is recorded",
+        lambda controls: controls.session is not None and controls.session.transport.speed < 1.0,
+        _half_speed,
     ),
     "loop": switch(
         "Loop",

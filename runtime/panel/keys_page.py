@@ -31,6 +31,7 @@ COLUMNS: tuple[dict[str, tuple[str, ...]], ...] = (
             "recall",
             "save",
             "loop",
+            "half-speed",
         ),
     },
     {

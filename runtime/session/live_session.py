@@ -230,9 +230,12 @@ class LiveSession:
             self._last.append(session.clips[-1].id)
         if self._last and session.punch is not None:
             session = self._punched(session)
+        if len(session.takes) == len(self.session.takes):
+            return  # none could be kept, which was told
         self.edit(session, f"record {name}")
         seconds = max(performance.duration for _, performance in made)
-        self._tell(f"kept {name}: {seconds:.1f} s")
+        outside = "" if self._last else ", all of it outside the range that is recorded"
+        self._tell(f"kept {name}: {seconds:.1f} s{outside}")
 
     def _punched(self, session: Session) -> Session:
         """The session with its newest clips cut to the range that is to be recorded."""

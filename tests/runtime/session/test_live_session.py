@@ -215,3 +215,41 @@ def test_a_take_without_a_frame_is_told_and_not_kept(tmp_path: Path) -> None:
         assert session.session.takes == ()
         said = [notice.text for notice in show.controls.notices.current]
         assert "the take holds no frame: it is not kept" in said
+
+
+def test_what_is_recorded_at_half_speed_fits_at_full_speed(tmp_path: Path) -> None:
+    with open_show(tmp_path / "s.bunraku") as show:
+        set_value("half-speed", 1.0, show.controls)
+        record(show, 61)
+        session = show.controls.session
+        assert session is not None
+        (clip,) = session.session.clips
+        assert clip.speed == 2.0
+        assert clip.length == pytest.approx(0.5, abs=1e-3)
+
+
+def test_a_take_outside_the_range_is_kept_without_a_clip_and_told(tmp_path: Path) -> None:
+    with open_show(tmp_path / "s.bunraku") as show:
+        session = show.controls.session
+        assert session is not None
+        session.edit(edits.punched(session.session, 5.0, 6.0), "punch in")
+        record(show, 10)
+        assert len(session.session.takes) == 1
+        assert session.session.clips == ()
+        said = [notice.text for notice in show.controls.notices.current]
+        assert any("outside the range" in line for line in said)
+
+
+def test_stopping_ends_a_take_and_keeps_it(tmp_path: Path) -> None:
+    with open_show(tmp_path / "s.bunraku") as show:
+        ticks(show, 2)
+        press("record", show.controls)
+        ticks(show, 20)
+        press("half-speed", show.controls)
+        press("rehearse", show.controls)
+        session = show.controls.session
+        assert session is not None
+        assert not show.controls.takes.recording
+        (clip,) = session.session.clips
+        assert clip.speed == 1.0
+        assert session.session.takes[0].performance.duration == pytest.approx(19 / 60, abs=1e-3)
