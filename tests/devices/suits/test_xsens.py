@@ -256,6 +256,7 @@ def test_through_a_socket() -> None:
     with open_stream("xsens://127.0.0.1:0?fingers=on&up=z") as stream:
         assert isinstance(stream, LiveStream)
         assert stream.skeleton.names == GLOVES.names
+        assert stream.skeleton.rest_positions == pytest.approx(GLOVES.rest_positions)
         with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as sender:
             for data in mxtp02(posed(GLOVES), parts=2):
                 sender.sendto(data, ("127.0.0.1", stream.transport.port))
