@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -57,15 +58,19 @@ def _draw(
     with TemporaryDirectory() as folder:
         store = SessionStore(Path(folder) / "show.bunraku") if stage is _layer else None
         settings = ShowSettings(
-            size=size, match=MatchSettings(rehearse=stage is not _match), origin="webcam://0"
+            size=size, match=MatchSettings(rehearse=stage is not _match), origin="wave.mcap"
         )
         stream = play(builtin_recording("wave"), every_frame=True, loop=True)
         characters = [load_character("squid")]
         with Show(stream, characters, settings, context=context, session=store) as show:
             stage(show)
-            panel = Panel(context, show.controls, show._opened.status)
+            seconds = itertools.count()
+            panel = Panel(
+                context, show.controls, show._opened.status, clock=lambda: float(next(seconds))
+            )
             target = context.simple_framebuffer(size, components=4)
             for _ in range(LAYOUTS):
+                show.controls.loop.draw()  # clear of the panel, once that is laid out
                 show.controls.scene.stage.show(target)  # type: ignore[union-attr]  # it draws
                 panel.draw(target)
             read = target.read(components=3, alignment=1)

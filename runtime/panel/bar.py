@@ -45,7 +45,7 @@ WORDED = (
 )
 """The buttons with words, as long as there is room for them: the first ones first."""
 OF_WINDOW = ("sliders", "audience", "full-screen", "panel", "help")
-TIME = 170.0  # [px] width of the line of time in a picture of the usual height
+TIME = 120.0  # [px] width of the line of time in a picture of the usual height
 
 
 def draw_bar(status: ShowStatus, controls: ShowControls, margin: float, scale: float) -> float:
@@ -100,12 +100,14 @@ class _Bar:
     def _draw_time(self, playback: PlaybackStatus) -> None:
         imgui.same_line()
         imgui.set_next_item_width(TIME * self._scale)
-        words = f"{clock(playback.position)} / {clock(playback.duration)}"
         changed, moment = imgui.slider_float(
-            "##time", playback.position, 0.0, max(playback.duration, 1e-6), words
+            "##time", playback.position, 0.0, max(playback.duration, 1e-6), ""
         )
         if changed and self._controls.playback is not None:
             self._controls.playback.seek(min(max(moment, 0.0), playback.duration))
+        imgui.same_line()
+        imgui.align_text_to_frame_padding()
+        imgui.text(_time(playback))
 
     def _draw_place(self) -> None:
         imgui.same_line()
@@ -148,7 +150,7 @@ class _Bar:
         names = [*self._left, *self._chosen, *self._deciding, *OF_WINDOW]
         taken = sum(self._width(name) + gap for name in names) + gap
         if self._playback is not None:
-            taken += TIME * self._scale + gap
+            taken += TIME * self._scale + imgui.calc_text_size(_time(self._playback)).x + 2.0 * gap
         if self._place:
             taken += imgui.calc_text_size(self._place).x + gap
         room = imgui.get_content_region_avail().x - taken
@@ -159,3 +161,8 @@ class _Bar:
                 words.add(name)
                 room -= width
         return words
+
+
+def _time(playback: PlaybackStatus) -> str:
+    """Where a recording is, and how long it lasts."""
+    return f"{clock(playback.position)} / {clock(playback.duration)}"

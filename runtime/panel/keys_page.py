@@ -6,6 +6,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from runtime.control.actions import ACTIONS
 from runtime.control.keys import KEYS
+from runtime.control.session_actions import SESSION_ACTIONS
 from runtime.control.show_controls import ShowControls
 from runtime.panel.gui import GOLD
 from runtime.panel.widgets import card, heading, letters
@@ -92,7 +93,7 @@ def draw_keys(controls: ShowControls, left: float, margin: float, scale: float) 
         imgui.text_disabled("  ? or a click closes this page")
         imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(spacing.x, 0.45 * spacing.y))
         if imgui.begin_table("columns", len(COLUMNS)):
-            for column, groups in enumerate(_columns()):
+            for column, groups in enumerate(_columns(in_session=controls.session is not None)):
                 imgui.table_next_column()
                 for name, rows in groups:
                     heading(name)
@@ -104,14 +105,18 @@ def draw_keys(controls: ShowControls, left: float, margin: float, scale: float) 
             controls.view.help = False
 
 
-def _columns() -> list[list[tuple[str, list[tuple[str, str]]]]]:
-    """Each column's groups, with their rows of keys and texts; keys of no group come after them."""
-    key_of = {name: key for key, name in KEYS.items()}
+def _columns(*, in_session: bool) -> list[list[tuple[str, list[tuple[str, str]]]]]:
+    """Each column's groups, with their rows of keys and texts; keys of no group come after them.
+
+    Without a session, its keys are left out.
+    """
+    idle = set() if in_session else set(SESSION_ACTIONS) - {"loop"}
+    key_of = {name: key for key, name in KEYS.items() if name not in idle}
     grouped = [name for groups in COLUMNS for names in groups.values() for name in names]
-    rest = [name for name in KEYS.values() if name not in grouped]
+    rest = [name for name in key_of if name not in grouped]
     columns = [
         [
-            (group, [(key_of[name], ACTIONS[name].text) for name in names])
+            (group, [(key_of[name], ACTIONS[name].text) for name in names if name in key_of])
             for group, names in groups.items()
         ]
         for groups in COLUMNS

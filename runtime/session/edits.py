@@ -118,7 +118,17 @@ def eased(session: Session, number: int, ease_in: float, ease_out: float) -> Ses
 
 
 def limited(session: Session, number: int, nodes: tuple[int, ...] | None) -> Session:
-    """Let a clip move only some nodes of its take, or all (None)."""
+    """Let a clip move only some nodes of its take, or all (None).
+
+    Raises:
+        InputError: its take moves none of them.
+    """
+    if nodes is not None:
+        moved = session.take(session.clip(number).take).performance.nodes.tolist()
+        if not set(nodes) & set(moved):
+            raise InputError(
+                f"clip {number} would move nothing: its take moves the nodes {_few(moved)}"
+            )
     return _changed(session, number, nodes=nodes, placed=nodes is None)
 
 
@@ -150,9 +160,15 @@ def without_clip(session: Session, number: int) -> Session:
 
 
 def renamed(session: Session, number: int, name: str) -> Session:
-    """Give a take another name."""
-    take = session.take(number)
-    named = replace(take, name=" ".join(name.split())[:MOST_NAME])
+    """Give a take another name.
+
+    Raises:
+        InputError: the name is empty.
+    """
+    take, words = session.take(number), " ".join(name.split())[:MOST_NAME]
+    if not words:
+        raise InputError(f"take {number} needs a name, got an empty one")
+    named = replace(take, name=words)
     return replace(session, takes=tuple(named if one is take else one for one in session.takes))
 
 
@@ -206,6 +222,12 @@ EDITS: dict[str, Edit] = {
     "punch": punched,
 }
 """Every edit that a script or a panel can name. A new edit is one more line here."""
+
+
+def _few(numbers: list[int]) -> str:
+    """Some numbers, and how many others there are."""
+    shown = ", ".join(map(str, numbers[:12]))
+    return f"{shown} and {len(numbers) - 12} more" if len(numbers) > 12 else shown
 
 
 def _changed(session: Session, number: int, **changes: Any) -> Session:

@@ -39,7 +39,7 @@ def details(status: ShowStatus) -> str:
         words += [
             f"{one.seen} of {one.joints} joints seen" + _lost(one) for one in status.performers
         ]
-        if live:
+        if live and sighting.seconds >= 1.0:
             words.append(f"for {_duration(sighting.seconds)}")
     return ", ".join(words)
 

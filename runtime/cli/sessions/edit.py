@@ -36,11 +36,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Do the edits, all or none; print what the session holds then."""
     from runtime.cli.sessions.contents import lines_of
+    from runtime.session.archive import SUFFIX
     from runtime.session.folder import Opened
 
     path: Path = options.session
     if not path.is_file():
         raise InputError(f"there is no session {path}; `bunraku session` makes one")
+    if path.suffix.lower() != SUFFIX:
+        raise InputError(f"{path} is no session: its name does not end in {SUFFIX}")
     edits = [] if options.script is None else _read(options.script)
     where = [f"edit {number} of {options.script}" for number in range(1, len(edits) + 1)]
     if options.out is None:
@@ -136,4 +139,5 @@ def _edited(session: Session, edit: dict[str, Any], where: str) -> Session:
     except InputError as error:
         raise InputError(f"{where}: {error}") from error
     except (TypeError, ValueError, AttributeError, OverflowError) as error:
-        raise InputError(f"{where}: {name!r} got a value of a wrong kind ({error})") from error
+        said = ", ".join(f"{field}: {given[field]!r:.40}" for field in fields)
+        raise InputError(f"{where}: {name!r} got a value of a wrong kind ({said})") from error

@@ -58,6 +58,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Perform until the window is closed, or Ctrl-C; the session is saved then."""
     from runtime.cli.performing import NOBODY, perform
+    from runtime.output.files.kept_file import counting
     from runtime.session.store import SessionStore
     from runtime.show import messages
 
@@ -83,7 +84,8 @@ def run(options: argparse.Namespace) -> int:
         raise
     session = store.session
     messages.announce(
-        f"{store.path}: {len(session.takes)} takes, {len(session.clips)} clips, "
+        f"{store.path}: {counting(len(session.takes), 'take')}, "
+        f"{counting(len(session.clips), 'clip')}, "
         f"{session.duration:.2f} s"
     )
     return code

@@ -95,9 +95,11 @@ def test_edits_are_done_in_order_and_written_elsewhere(saved: Path, tmp_path: Pa
         ({"edit": "weight", "clip": 1, "weight": 7.0}, "weight is 7.0"),
         ({"edit": "speed", "clip": 1, "speed": "fast"}, "wrong kind"),
         ({"edit": "move", "clip": [1], "start": None}, "wrong kind"),
+        ({"edit": "rename", "take": 1, "name": "  "}, "needs a name"),
         ({"edit": "mute", "clip": 1, "on": 7}, "neither true nor false"),
         ({"edit": "mark", "time": float("nan"), "name": "here"}, "expected a number"),
-        ({"edit": "limit", "clip": 1, "nodes": ["tail"]}, "expected a whole number"),
+        ({"edit": "limit", "clip": 1, "nodes": ["tail"]}, "would move nothing"),
+        ({"edit": "limit", "clip": 1, "nodes": [999]}, "would move nothing"),
     ],
 )
 def test_a_wrong_edit_is_refused_in_one_line(

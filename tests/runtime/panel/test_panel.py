@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from replay.player import EveryFrame, Player
 from runtime.control.actions import ACTIONS
 from runtime.control.keys import KEYS
+from runtime.control.session_actions import SESSION_ACTIONS
 from runtime.control.show_controls import ShowControls
 from runtime.driving.choices import Candidate
 from runtime.driving.driver import RELATIVE, DrivenPart
@@ -95,11 +96,15 @@ def test_the_legend_of_many_characters_leaves_the_bar_free(
 ) -> None:
     status = show._opened.status()
     bar = slice(_top_of_bar(screen.draw()), None)
-    before = screen.draw()[bar, :300].copy()
     part = DrivenPart(
         "left leg", "tentacle 4 of 8, the upper one on the left", (0,), (0,), RELATIVE
     )
-    many = [replace(status.characters[0], name=f"squid {n}", parts=[part] * 8) for n in range(30)]
+    few, many = (
+        [replace(status.characters[0], name=f"squid {n}", parts=parts) for n in range(count)]
+        for count, parts in ((2, []), (30, [part] * 8))
+    )
+    screen.status = lambda: replace(status, characters=few)
+    before = screen.draw()[bar, :300].copy()
     screen.status = lambda: replace(status, characters=many)
     after = screen.draw()
     np.testing.assert_array_equal(after[bar, :300], before)
@@ -197,10 +202,13 @@ def test_a_button_says_at_once_what_it_does(screen: Screen) -> None:
     assert (covered(screen.draw(1))[:bar] & ~before).sum() > 1000
 
 
-def test_the_page_of_keys_has_every_key_once() -> None:
-    shown = [key for groups in keys_page._columns() for _, rows in groups for key, _ in rows]
+@pytest.mark.parametrize("in_session", [True, False])
+def test_the_page_of_keys_has_every_key_once(in_session: bool) -> None:
+    columns = keys_page._columns(in_session=in_session)
+    shown = [key for groups in columns for _, rows in groups for key, _ in rows]
     mouse = [key for key, _ in keys_page.MOUSE]
-    assert sorted(shown) == sorted([*KEYS, *mouse])
+    idle = set() if in_session else set(SESSION_ACTIONS) - {"loop"}
+    assert sorted(shown) == sorted([*(k for k, name in KEYS.items() if name not in idle), *mouse])
 
 
 def test_sliders_leave_the_bar_free(screen: Screen, show: StagedShow) -> None:
