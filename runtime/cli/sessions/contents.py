@@ -62,5 +62,6 @@ def _clip(session: Session, clip: Clip) -> str:
         f"{len(clip.nodes)} nodes" if clip.nodes is not None else "",
     ]
     said = "".join(f", {each}" for each in how if each)
-    name = printable(session.take(clip.take).name)
-    return f"clip        {clip.id}: {clip.start:.2f} to {clip.end:.2f} s, {name}{said}"
+    take = session.take(clip.take)
+    played = f"{printable(take.name)} of {_name(session, take.actor)}"
+    return f"clip        {clip.id}: {clip.start:.2f} to {clip.end:.2f} s, {played}{said}"

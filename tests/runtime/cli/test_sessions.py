@@ -159,7 +159,7 @@ def test_a_session_ends_with_what_it_holds(
     performed(path, recording, "--character", "squid")
     said = capsys.readouterr()
     lines = (said.out + said.err).splitlines()
-    assert any(line.endswith(": 1 takes, 1 clips, " + line.split(", ")[-1]) for line in lines)
+    assert any(line.endswith(": 1 take, 1 clip, " + line.split(", ")[-1]) for line in lines)
     assert not any(".mcap: " in line for line in lines)
 
 
