@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from runtime.characters.character import Character
 from runtime.characters.proxy import proxy_of
-from runtime.driving.driver import Driver, Highlight, MappedDriver
+from runtime.driving.driver import Driver, Highlight
 from runtime.driving.performer import Pose
 from runtime.driving.targets import HandleTargets, PosedNodes, SkinnedTargets, Targets
 from runtime.puppet.bound_skeleton import BoundSkeleton
@@ -236,12 +236,12 @@ class Puppet:
         place, nodes = self._stance.place, self._targets.nodes
         if self.layers is not None and not self.layers.shows_driver:
             return []
-        driver = self.driver if self.proposal is None else self.proposal
-        if isinstance(self.proposal, MappedDriver) and nodes is not None:
+        if self.proposal is not None and nodes is not None:
             return [  # on the character as it is now, which another driver moves
-                Highlight(place(nodes.positions[list(drive.target)]), drive.source[1:])
-                for drive in self.proposal.mapping.drives
+                Highlight(place(nodes.positions[list(part.target)]), part.source[1:])
+                for part in self.proposal.parts
             ]
+        driver = self.driver if self.proposal is None else self.proposal
         if driver is None:
             return []
         return [replace(each, points=place(each.points)) for each in driver.highlights]

@@ -19,11 +19,14 @@ from devices.builtin.motions import motion_clip
 from devices.builtin.simulator import Simulator
 from devices.errors import InputError
 from devices.skeleton import Skeleton, SkeletonFrame
+from replay.builtin import builtin_recording
 from replay.formats import read_recording
 from replay.player import EveryFrame, Player, RealTime
 from runtime.characters.character import Character
-from runtime.control.actions import ACTIONS
+from runtime.characters.open_character import load_character
+from runtime.control.actions import ACTIONS, press
 from runtime.output.output import PerformedFrame
+from runtime.show.open_stream import play
 from runtime.show.pacing import AtOnce
 from runtime.show.settings import (
     CharacterSettings,
@@ -321,3 +324,23 @@ def test_several_performers_drive_a_character_each(figure: Character) -> None:
         for tick in range(5):
             clock[0] = tick / 60.0
             assert show.tick()
+
+
+def test_what_is_proposed_lights_up_on_the_character_as_it_is_now() -> None:
+    """A body performs on while a match is looked for; its limbs light up where they are."""
+    stream = play(builtin_recording("wave"), every_frame=True, loop=True)
+    with Show(stream, [load_character("mannequin")]) as show:
+        for _ in range(40):
+            show.tick()
+        press("match-again", show.controls)
+        for _ in range(20):
+            show.tick()
+        (puppet,), nodes = show.puppets, show.motions[0].nodes
+        assert puppet.proposal is not None
+        assert nodes is not None
+        for highlight, part in zip(puppet.highlights, puppet.proposal.parts, strict=True):
+            np.testing.assert_allclose(
+                highlight.points, nodes.positions[list(part.target)], atol=1e-9
+            )
+        rest = puppet.character.skeleton.rest_positions
+        assert np.abs(nodes.positions - rest).max() > 0.1
