@@ -35,7 +35,7 @@ def perform(
     origin: str,
     read: Sequence[tuple[str, Path]] = (),
     session: SessionStore | None = None,
-    began: Callable[[Show], None] = lambda _: None,
+    then: Callable[[Show], object] = lambda _: None,
     kiosk: float | None = None,
 ) -> int:
     """Perform the show that the options ask for; the exit code.
@@ -46,7 +46,7 @@ def perform(
         origin: the address or name of the stream; `NOBODY` where nobody performs.
         read: files that are read and must not be written, each with the name of its option.
         session: where takes are kept and played from.
-        began: is called once, after the first frame was performed.
+        then: is called after each frame that was performed.
         kiosk: of `ShowSettings`.
 
     Raises:
@@ -73,7 +73,7 @@ def perform(
         show = Show(stream, characters, settings, pace=pace, session=session, tell=messages.say)
         try:
             with show:
-                _run(show, stream, began)
+                _run(show, stream, then)
         except Interrupted:
             tell_kept(show)
             raise
@@ -102,7 +102,7 @@ def tell_kept(show: Show) -> None:
         raise InputError(f"not kept whole: {', '.join(faulty)}")
 
 
-def _run(show: Show, stream: SkeletonStream, began: Callable[[Show], None]) -> None:
+def _run(show: Show, stream: SkeletonStream, then: Callable[[Show], object]) -> None:
     total = len(stream.recording) if _ends(stream) else None
     told: dict[str, object] = {}
     if show.settings.window:
@@ -111,8 +111,7 @@ def _run(show: Show, stream: SkeletonStream, began: Callable[[Show], None]) -> N
     with Progress("performing", total) as progress:
 
         def advance() -> None:
-            if show.frames == 1:
-                began(show)
+            then(show)
             _tell_parts(show, told)
             progress.advance(said=_milliseconds(show.latency))
 

@@ -138,13 +138,18 @@ class LiveSession:
         """Whether a take is recorded."""
         return self.transport.mode is Mode.RECORDING
 
-    def record(self) -> bool:
-        """Record the armed characters from the session's time on; return whether one can be."""
-        self._recorded = [
+    @property
+    def performed(self) -> list[ActorLayers]:
+        """The characters that performers move, and that are armed."""
+        return [
             layers
             for layers, one in zip(self._layers, self._staged, strict=True)
             if one.performs() and self._armed(one.puppet)
         ]
+
+    def record(self) -> bool:
+        """Record the armed characters from the session's time on; return whether one can be."""
+        self._recorded = self.performed
         if not self._recorded:
             self._warn("no performer moves a character that is selected: nothing to record yet")
             return False

@@ -32,7 +32,7 @@ class Once(argparse.Action):
             ArgumentError: the option was given before.
         """
         if getattr(namespace, self.dest) is not self.default:
-            raise argparse.ArgumentError(self, "is given twice; one file of a kind can be written")
+            raise argparse.ArgumentError(self, "is given twice; leave one out")
         setattr(namespace, self.dest, values)
 
 

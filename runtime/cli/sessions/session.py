@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from runtime.cli.live import for_performers, is_camera
-from runtime.cli.options.arguments import positive, seconds
+from runtime.cli.options.arguments import Once, positive, seconds
 from runtime.cli.options.input_options import add_input_options, stated
 from runtime.cli.options.show_options import add_character_option, add_show_options
 
@@ -28,13 +28,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     performer = parser.add_mutually_exclusive_group()
     performer.add_argument(
-        "--device", metavar="URL", help="a live performer; `bunraku devices` lists the devices"
+        "--device",
+        action=Once,
+        metavar="URL",
+        help="a live performer; `bunraku devices` lists the devices",
     )
     performer.add_argument(
-        "--recording", type=Path, metavar="FILE", help="a recorded performer, again and again"
+        "--recording",
+        action=Once,
+        type=Path,
+        metavar="FILE",
+        help="a recorded performer, again and again",
     )
     parser.add_argument(
-        "--take", action="store_true", help="begin a take at once, as pressing r does"
+        "--take", action="store_true", help="begin a take as soon as somebody performs"
     )
     parser.add_argument(
         "--at",
@@ -76,7 +83,7 @@ def run(options: argparse.Namespace) -> int:
             origin=origin,
             read=[("--recording", options.recording)] if options.recording else [],
             session=store,
-            began=lambda show: _begin(show, options.at, take=options.take),
+            then=_Beginning(options.at, take=options.take),
             kiosk=options.kiosk,
         )
     except BaseException:
@@ -91,14 +98,30 @@ def run(options: argparse.Namespace) -> int:
     return code
 
 
-def _begin(show: Show, at: float, *, take: bool) -> None:
-    """Let the time stand at a second of the session, and begin a take there if one is asked for."""
-    from runtime.control.actions import press
+class _Beginning:
+    """Lets the time stand at a second of the session; begins a take once somebody performs.
 
-    if show.controls.session is not None:
-        show.controls.session.transport.go_to(at)
-    if take:
-        press("record", show.controls)
+    Args:
+        at: [s] of the session's time.
+        take: whether a take is to begin.
+    """
+
+    def __init__(self, at: float, *, take: bool) -> None:
+        self._at: float | None = at
+        self._waits = take
+
+    def __call__(self, show: Show) -> None:
+        """Go on, after a frame of the show."""
+        from runtime.control.actions import press
+
+        session = show.controls.session
+        assert session is not None
+        if self._at is not None:
+            session.transport.go_to(self._at)
+            self._at = None
+        if self._waits and session.performed:
+            self._waits = False
+            press("record", show.controls)
 
 
 def _source(options: argparse.Namespace) -> SkeletonStream:

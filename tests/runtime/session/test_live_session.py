@@ -14,6 +14,7 @@ from devices.errors import InputError
 from replay.builtin import builtin_recording
 from replay.formats import read_recording
 from runtime.characters.open_character import load_character
+from runtime.cli.sessions.session import _Beginning
 from runtime.control.actions import press, set_value
 from runtime.session import edits
 from runtime.session.store import SessionStore
@@ -253,3 +254,25 @@ def test_stopping_ends_a_take_and_keeps_it(tmp_path: Path) -> None:
         (clip,) = session.session.clips
         assert clip.speed == 1.0
         assert session.session.takes[0].performance.duration == pytest.approx(19 / 60, abs=1e-3)
+
+
+def test_a_take_that_was_asked_for_waits_for_somebody_who_performs(tmp_path: Path) -> None:
+    """As with a live performer, who is seen before a match performs."""
+    wave = builtin_recording("wave")
+    settings = ShowSettings(match=MatchSettings(rehearse=False, patience=0.3))
+    store = SessionStore(tmp_path / "s.bunraku")
+    stream = play(wave, every_frame=True)
+    begin = _Beginning(1.5, take=True)
+    with Show(stream, [load_character("squid")], settings, session=store) as show:
+        session = show.controls.session
+        assert session is not None
+        modes = []
+        for _ in range(60):
+            assert show.tick()
+            begin(show)
+            modes.append(session.transport.mode)
+        press("record", show.controls)
+        (clip,) = session.session.clips
+    assert modes[:10] == [Mode.REHEARSING] * 10
+    assert modes[-1] is Mode.RECORDING
+    assert clip.start == 1.5
