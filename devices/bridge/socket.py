@@ -1,4 +1,4 @@
-"""ZeroMQ sockets for both ends of a bridge: bounded queues, heartbeats, encryption, reconnection.
+"""ZeroMQ sockets for both ends of a bridge: bounded queues, probes, encryption, reconnection.
 
 Source: https://libzmq.readthedocs.io/en/latest/zmq_setsockopt.html and zmq_socket_monitor.html.
 """
@@ -14,8 +14,8 @@ from devices.bridge.keys import PublisherKeys, SubscriberKeys
 from devices.bridge.messages import MAX_MESSAGE
 
 DOMAIN = "bunraku"
-_HEARTBEAT = 500  # [ms] between ZeroMQ's own heartbeats
-_DEAD = 2000  # [ms] without a heartbeat, after which a connection counts as broken
+_IDLE, _PROBES = 1, 2  # [s] of silence before each of so many probes of the other machine
+_DEAD = 2000  # [ms] without an answer to what was sent, after which a connection counts as broken
 _RECONNECT = (100, 1000)  # [ms] first and longest pause before the next attempt
 _LINGER = 100  # [ms] that closing waits for the last message
 _QUEUE = 1000  # messages that wait to be read
@@ -59,8 +59,12 @@ def bridge_socket(
     # The credit bounds the frames to a subscriber that is honest; of one that never reads, the rest
     # is dropped.
     socket.sndhwm = _TO_SEND
-    socket.heartbeat_ivl = _HEARTBEAT
-    socket.heartbeat_timeout = _DEAD
+    # The system finds out that the other machine is gone. ZeroMQ's own heartbeats would, too, but
+    # libzmq ends the whole process where one is due on a connection that failed while its reader
+    # was behind (zeromq/libzmq#4364): any subscriber could do that.
+    socket.tcp_keepalive, socket.tcp_keepalive_idle = 1, _IDLE
+    socket.tcp_keepalive_intvl, socket.tcp_keepalive_cnt = _IDLE, _PROBES
+    socket.setsockopt(zmq.TCP_MAXRT, _DEAD)
     socket.reconnect_ivl, socket.reconnect_ivl_max = _RECONNECT
     if kind == zmq.DEALER:
         socket.immediate = True  # a call queued until a connection exists would carry an old time
