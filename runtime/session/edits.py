@@ -52,12 +52,21 @@ def trimmed(session: Session, number: int, start: float, end: float) -> Session:
         InputError: nothing would be left.
     """
     clip = session.clip(number)
+    if end <= start:
+        raise InputError(
+            f"cannot trim clip {number} from {start:g} to {end:g} s: the end comes first"
+        )
     if clip.passes != 1.0:
         span = (clip.last - clip.first) / clip.speed
         return _changed(session, number, passes=max(end - clip.start, SHORTEST) / span)
     most = session.take(clip.take).performance.duration
     first = max(clip.first + (start - clip.start) * clip.speed, 0.0)
     last = min(clip.last + (end - clip.end) * clip.speed, max(most, clip.last))
+    if last - first < SHORTEST:
+        raise InputError(
+            f"cannot trim clip {number} from {start:g} to {end:g} s: nothing of it is there; it "
+            f"lasts from {clip.start:g} to {clip.end:g} s"
+        )
     begins = max(clip.start + (first - clip.first) / clip.speed, 0.0)
     return _changed(session, number, start=begins, first=first, last=last)
 
@@ -113,7 +122,17 @@ def made_additive(session: Session, number: int, on: bool) -> Session:
 
 
 def eased(session: Session, number: int, ease_in: float, ease_out: float) -> Session:
-    """Let a clip come and go within so many seconds of the session's time."""
+    """Let a clip come and go within so many seconds of the session's time.
+
+    Raises:
+        InputError: both together are longer than the clip.
+    """
+    length = session.clip(number).length
+    if ease_in + ease_out > length:
+        raise InputError(
+            f"clip {number} cannot come and go within {ease_in:g} and {ease_out:g} s: "
+            f"it lasts {length:.2f} s"
+        )
     return _changed(session, number, ease_in=ease_in, ease_out=ease_out)
 
 
@@ -121,9 +140,14 @@ def limited(session: Session, number: int, nodes: tuple[int, ...] | None) -> Ses
     """Let a clip move only some nodes of its take, or all (None).
 
     Raises:
-        InputError: its take moves none of them.
+        InputError: there is no such node, or its take moves none of them.
     """
     if nodes is not None:
+        actor = session.actor(session.take(session.clip(number).take).actor)
+        if none := [node for node in nodes if not 0 <= node < actor.nodes]:
+            raise InputError(
+                f"{actor.name} has no node {_few(none)}: its nodes are 0 to {actor.nodes - 1}"
+            )
         moved = session.take(session.clip(number).take).performance.nodes.tolist()
         if not set(nodes) & set(moved):
             raise InputError(
@@ -173,15 +197,26 @@ def renamed(session: Session, number: int, name: str) -> Session:
 
 
 def marked(session: Session, time: float, name: str) -> Session:
-    """Add a mark at `time` [s] of the session's time."""
-    marks = [*session.marks, Mark(max(time, 0.0), " ".join(name.split())[:MOST_NAME])]
+    """Add a mark at `time` [s] of the session's time.
+
+    Raises:
+        InputError: the name is empty.
+    """
+    words = " ".join(name.split())[:MOST_NAME]
+    if not words:
+        raise InputError(f"the mark at {time:g} s needs a name, got an empty one")
+    marks = [*session.marks, Mark(max(time, 0.0), words)]
     return replace(session, marks=tuple(sorted(marks, key=lambda mark: mark.time)))
 
 
 def unmarked(session: Session, time: float) -> Session:
-    """Take away the mark that is nearest to `time` [s]; nothing where there is none."""
+    """Take away the mark that is nearest to `time` [s].
+
+    Raises:
+        InputError: there is no mark.
+    """
     if not session.marks:
-        return session
+        raise InputError("there is no mark to take away")
     nearest = min(session.marks, key=lambda mark: abs(mark.time - time))
     return replace(session, marks=tuple(one for one in session.marks if one is not nearest))
 

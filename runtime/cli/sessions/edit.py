@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import inspect
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -80,13 +79,14 @@ def _copy(path: Path, out: Path) -> None:
 
 def _edit(path: Path, edits: list[dict[str, Any]], where: list[str]) -> tuple[Session, list[str]]:
     """Edit a session's file; return the session, and what was lost or recovered."""
+    from runtime.cli.sessions.edit_script import edited
     from runtime.session.store import SessionStore
 
     store = SessionStore(path)
     try:
         session = store.session
         for edit, place in zip(edits, where, strict=True):
-            session = _edited(session, edit, place)
+            session = edited(session, edit, place)
         store.versions.do(session, "edit")
         store.close()
     except BaseException:
@@ -106,38 +106,3 @@ def _read(path: Path) -> list[dict[str, Any]]:
     if not isinstance(edits, list) or not all(isinstance(edit, dict) for edit in edits):
         raise InputError(f'{path} is no list of edits such as [{{"edit": "mute", "clip": 1}}]')
     return edits
-
-
-def _edited(session: Session, edit: dict[str, Any], where: str) -> Session:
-    """The session after one edit.
-
-    Raises:
-        InputError: it names no edit, has other fields than the edit, or cannot be done.
-    """
-    from runtime.session.codec import as_json, from_json
-    from runtime.session.edits import EDITS
-
-    name = edit.get("edit")
-    if not isinstance(name, str) or name not in EDITS:
-        raise InputError(f"{where}: no edit is called {name!r:.40}; there are: {', '.join(EDITS)}")
-    parameters = list(inspect.signature(EDITS[name]).parameters)[1:]
-    fields = ["take" if name == "rename" else "clip", *parameters[1:]]
-    fields = fields if parameters and parameters[0] == "number" else parameters
-    given = {key: value for key, value in edit.items() if key != "edit"}
-    if set(given) != set(fields):
-        raise InputError(
-            f"{where}: {name!r} takes {', '.join(fields)}; it has {', '.join(given) or 'nothing'}"
-        )
-    values = [
-        tuple(value) if isinstance(value := given[field], list) else value for field in fields
-    ]
-    performances = {take.performance.key: take.performance for take in session.takes}
-    try:
-        edited = EDITS[name](session, *values)
-        # Read as a file is, so that no value of a wrong kind reaches one.
-        return from_json(as_json(edited), performances.__getitem__)
-    except InputError as error:
-        raise InputError(f"{where}: {error}") from error
-    except (TypeError, ValueError, AttributeError, OverflowError) as error:
-        said = ", ".join(f"{field}: {given[field]!r:.40}" for field in fields)
-        raise InputError(f"{where}: {name!r} got a value of a wrong kind ({said})") from error
