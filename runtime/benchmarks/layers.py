@@ -14,9 +14,9 @@ from runtime.characters.builtin import builtin_character
 from runtime.control.actions import press
 from runtime.session import edits
 from runtime.session.document import Actor, Session, Take
+from runtime.session.files.store import SessionStore
 from runtime.session.performance import Performance
 from runtime.session.playing import ActorPlayer
-from runtime.session.store import SessionStore
 from runtime.show.open_stream import play
 from runtime.show.settings import ShowSettings
 from runtime.show.show import Show

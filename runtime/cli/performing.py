@@ -16,7 +16,7 @@ from runtime.characters.open_character import load_character
 from runtime.cli.options.show_options import show_settings
 from runtime.cli.warm import warm_up
 from runtime.control.keys import key_hint
-from runtime.session.store import SessionStore
+from runtime.session.files.store import SessionStore
 from runtime.show import messages
 from runtime.show.collector_pauses import collector_paused
 from runtime.show.interrupts import Interrupted

@@ -17,7 +17,7 @@ from runtime.output.files.whole_file import whole_file
 from runtime.panel.panel import Panel
 from runtime.render.context import headless_context, release_headless
 from runtime.session import edits
-from runtime.session.store import SessionStore
+from runtime.session.files.store import SessionStore
 from runtime.show.open_stream import play
 from runtime.show.settings import MatchSettings, ShowSettings
 from runtime.show.show import Show

@@ -9,12 +9,13 @@ from pathlib import Path
 from devices.errors import InputError
 from devices.skeleton import Skeleton
 from runtime.puppet.puppet import Puppet
-from runtime.session import edits, unfinished
+from runtime.session import edits
 from runtime.session.actor_layers import ActorLayers, Cue
 from runtime.session.document import Session, Take, next_id
+from runtime.session.files import unfinished
+from runtime.session.files.store import SessionStore
 from runtime.session.kiosk import Kiosk
 from runtime.session.performance import Performance
-from runtime.session.store import SessionStore
 from runtime.session.transport import Mode, Transport
 
 

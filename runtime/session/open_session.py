@@ -10,8 +10,8 @@ from runtime.driving.matching.puppet_match import PuppetMatch
 from runtime.puppet.puppet import Puppet
 from runtime.session.document import Actor, Session
 from runtime.session.edits import with_actor
+from runtime.session.files.store import SessionStore
 from runtime.session.live_session import LiveSession, StagedActor
-from runtime.session.store import SessionStore
 from runtime.session.versions import Versions
 from runtime.show.act_group import Act, ActGroup
 

@@ -13,8 +13,8 @@ from devices.errors import InputError
 from runtime.characters.builtin import BUILTIN
 from runtime.characters.open_character import load_character
 from runtime.session.actor_layers import ActorLayers, Cue
-from runtime.session.archive import unpack
-from runtime.session.folder import SessionFolder
+from runtime.session.files.archive import unpack
+from runtime.session.files.folder import SessionFolder
 from runtime.session.nobody import nobody_for
 from runtime.show.open_stream import play
 from runtime.show.settings import MatchSettings, ShowSettings

@@ -22,7 +22,7 @@ from runtime.output.files.kept_file import Kept
 from runtime.output.output import Output
 from runtime.output.report.report import Report
 from runtime.puppet.puppet import Motion
-from runtime.session.store import SessionStore
+from runtime.session.files.store import SessionStore
 from runtime.show import messages
 from runtime.show.collector_pauses import collector_paused, objects_frozen
 from runtime.show.interrupts import interrupts_deferred

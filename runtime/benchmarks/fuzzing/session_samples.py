@@ -12,12 +12,12 @@ import numpy as np
 from devices.bounded_json import parse_json
 from devices.errors import InputError
 from devices.skeleton import Skeleton
-from runtime.session import codec
-from runtime.session.archive import unpack
 from runtime.session.document import Actor, Clip, Mark, Session, Take
-from runtime.session.folder import DOCUMENT
+from runtime.session.files import codec
+from runtime.session.files.archive import unpack
+from runtime.session.files.folder import DOCUMENT
+from runtime.session.files.performance_file import read_performance, save_performance
 from runtime.session.performance import Performance
-from runtime.session.performance_file import read_performance, save_performance
 
 Sample = tuple[str, bytes, Callable[[Path], None]]
 

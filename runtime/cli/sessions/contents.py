@@ -6,9 +6,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from devices.printable import printable
-from runtime.session.archive import unpack
 from runtime.session.document import Clip, Session
-from runtime.session.folder import Opened, SessionFolder
+from runtime.session.files.archive import unpack
+from runtime.session.files.folder import Opened, SessionFolder
 
 
 def contents_of(path: Path) -> list[str]:

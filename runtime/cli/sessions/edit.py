@@ -35,8 +35,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> int:
     """Do the edits, all or none; print what the session holds then."""
     from runtime.cli.sessions.contents import lines_of
-    from runtime.session.archive import SUFFIX
-    from runtime.session.folder import Opened
+    from runtime.session.files.archive import SUFFIX
+    from runtime.session.files.folder import Opened
 
     path: Path = options.session
     if not path.is_file():
@@ -68,7 +68,7 @@ def _copy(path: Path, out: Path) -> None:
     import shutil
 
     from runtime.output.files.whole_file import check_suffix, whole_file
-    from runtime.session.archive import SUFFIX
+    from runtime.session.files.archive import SUFFIX
 
     check_suffix(out, (SUFFIX,))
     if out.exists():
@@ -80,7 +80,7 @@ def _copy(path: Path, out: Path) -> None:
 def _edit(path: Path, edits: list[dict[str, Any]], where: list[str]) -> tuple[Session, list[str]]:
     """Edit a session's file; return the session, and what was lost or recovered."""
     from runtime.cli.sessions.edit_script import edited
-    from runtime.session.store import SessionStore
+    from runtime.session.files.store import SessionStore
 
     store = SessionStore(path)
     try:

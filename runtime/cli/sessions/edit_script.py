@@ -8,9 +8,9 @@ import math
 from typing import Any
 
 from devices.errors import InputError
-from runtime.session.codec import as_json, from_json
 from runtime.session.document import Session
 from runtime.session.edits import EDITS
+from runtime.session.files.codec import as_json, from_json
 
 _TIMES = ("start", "end", "at", "time", "ease_in", "ease_out")
 _NODES = tuple[int, ...] | None

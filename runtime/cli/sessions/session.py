@@ -66,7 +66,7 @@ def run(options: argparse.Namespace) -> int:
     """Perform until the window is closed, or Ctrl-C; the session is saved then."""
     from runtime.cli.performing import NOBODY, perform
     from runtime.output.files.kept_file import counting
-    from runtime.session.store import SessionStore
+    from runtime.session.files.store import SessionStore
     from runtime.show import messages
 
     store = SessionStore(options.session)

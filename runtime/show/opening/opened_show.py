@@ -25,11 +25,11 @@ from runtime.output.report.report import Report
 from runtime.puppet.deformable_surface import Elasticity
 from runtime.puppet.puppet import Puppet
 from runtime.render.camera import front_camera
+from runtime.session.files.store import SessionStore
 from runtime.session.kiosk import Kiosk
 from runtime.session.live_session import LiveSession
 from runtime.session.open_session import open_session
 from runtime.session.session_takes import record_into
-from runtime.session.store import SessionStore
 from runtime.show.act_group import Act, ActGroup
 from runtime.show.interrupts import interrupts_deferred
 from runtime.show.loop import FrameLoop

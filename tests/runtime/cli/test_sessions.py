@@ -13,8 +13,8 @@ from replay.builtin import builtin_recording
 from replay.joint_table import write_joint_table
 from replay.recorder import Recorder
 from runtime.cli.command_line import main
+from runtime.session.files.store import SessionStore
 from runtime.session.nobody import nobody_for
-from runtime.session.store import SessionStore
 from tests.runtime.output.files.test_point_cache import read_pc2
 
 CUBE = """mtllib look.mtl

@@ -14,7 +14,7 @@ from runtime.characters.open_character import load_character
 from runtime.cli.command_line import main
 from runtime.panel.timeline import Timeline
 from runtime.session.document import Session
-from runtime.session.store import SessionStore
+from runtime.session.files.store import SessionStore
 from runtime.session.transport import Mode
 from runtime.show.open_stream import play
 from runtime.show.settings import ShowSettings

@@ -13,8 +13,8 @@ from runtime.control.actions import press
 from runtime.panel.panel import Panel
 from runtime.panel.timeline import Timeline
 from runtime.session import edits
+from runtime.session.files.store import SessionStore
 from runtime.session.live_session import LiveSession
-from runtime.session.store import SessionStore
 from runtime.session.transport import Mode
 from runtime.show.settings import MatchSettings, ShowSettings
 from runtime.show.show import Show

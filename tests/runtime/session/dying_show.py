@@ -20,10 +20,10 @@ from typing import Any
 from replay.builtin import builtin_recording
 from runtime.characters.open_character import load_character
 from runtime.control.actions import press
-from runtime.session.codec import as_json
 from runtime.session.document import Session
+from runtime.session.files.codec import as_json
+from runtime.session.files.store import SessionStore
 from runtime.session.live_session import LiveSession
-from runtime.session.store import SessionStore
 from runtime.show.open_stream import play
 from runtime.show.settings import ShowSettings
 from runtime.show.show import Show

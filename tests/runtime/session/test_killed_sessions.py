@@ -16,9 +16,9 @@ from replay.mcap.reader import McapReader
 from runtime.cli.command_line import main
 from runtime.control.actions import press
 from runtime.session import edits
-from runtime.session.archive import unpack
-from runtime.session.folder import SessionFolder
-from runtime.session.store import SessionStore
+from runtime.session.files.archive import unpack
+from runtime.session.files.folder import SessionFolder
+from runtime.session.files.store import SessionStore
 from runtime.session.versions import Versions
 from tests.runtime.session.sessions import chain, session, take
 from tests.runtime.session.test_live_session import open_show, record, ticks
@@ -114,7 +114,7 @@ def test_a_second_program_is_refused_in_one_line(tmp_path: Path) -> None:
 def test_a_program_that_dies_leaves_no_lock(tmp_path: Path) -> None:
     path = tmp_path / "show.bunraku"
     program = (
-        "import os, pathlib, sys; from runtime.session.store import SessionStore\n"
+        "import os, pathlib, sys; from runtime.session.files.store import SessionStore\n"
         "store = SessionStore(pathlib.Path(sys.argv[1])); print('open', flush=True)\n"
         "sys.stdin.read()"
     )

@@ -17,7 +17,7 @@ from runtime.characters.open_character import load_character
 from runtime.cli.sessions.session import _Beginning
 from runtime.control.actions import press, set_value
 from runtime.session import edits
-from runtime.session.store import SessionStore
+from runtime.session.files.store import SessionStore
 from runtime.session.transport import Mode
 from runtime.show.open_stream import play
 from runtime.show.settings import MatchSettings, ShowSettings

@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 
 from devices.errors import InputError
 from runtime.session import edits
-from runtime.session.codec import VERSION, as_json
-from runtime.session.performance_file import read_performance, save_performance
-from runtime.session.store import SessionStore
+from runtime.session.files.codec import VERSION, as_json
+from runtime.session.files.performance_file import read_performance, save_performance
+from runtime.session.files.store import SessionStore
 from runtime.session.versions import Versions
 from tests.runtime.session.sessions import chain, performance, random_edit, session, take
 

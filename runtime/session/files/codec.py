@@ -1,7 +1,7 @@
 """A session as JSON with a version, and back with every field checked.
 
-The arrays of the takes are files of their own (`runtime.session.performance_file`); the JSON names
-them by their content.
+The arrays of the takes are files of their own (`runtime.session.files.performance_file`); the JSON
+names them by their content.
 """
 
 from __future__ import annotations

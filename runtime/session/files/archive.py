@@ -16,7 +16,7 @@ from typing import BinaryIO
 from devices.errors import InputError
 from replay.bounds import check_recordable
 from runtime.output.files.whole_file import whole_file
-from runtime.session.folder import CHARACTERS, DOCUMENT, PERFORMANCES, RECORDINGS
+from runtime.session.files.folder import CHARACTERS, DOCUMENT, PERFORMANCES, RECORDINGS
 
 SUFFIX = ".bunraku"
 MOST_ENTRIES = 100_000

@@ -11,11 +11,17 @@ from devices.skeleton import Skeleton
 from runtime.characters.builtin import BUILTIN
 from runtime.characters.side_files import files_of
 from runtime.output.files.whole_file import check_suffix, check_writable, writing
-from runtime.session.archive import SUFFIX, pack, unpack
 from runtime.session.document import Session
-from runtime.session.folder import CHARACTERS, DOCUMENT, PERFORMANCES, RECORDINGS, SessionFolder
+from runtime.session.files.archive import SUFFIX, pack, unpack
+from runtime.session.files.folder import (
+    CHARACTERS,
+    DOCUMENT,
+    PERFORMANCES,
+    RECORDINGS,
+    SessionFolder,
+)
+from runtime.session.files.unfinished import rescue
 from runtime.session.performance import Performance
-from runtime.session.unfinished import rescue
 from runtime.session.versions import Versions
 
 UNSAVED = ".unsaved"

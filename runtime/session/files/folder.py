@@ -19,11 +19,11 @@ from devices.errors import InputError
 from devices.skeleton import Skeleton
 from replay.text_file import file_bytes
 from runtime.output.files.whole_file import whole_file, writing
-from runtime.session import codec
 from runtime.session.document import Session
-from runtime.session.lock import FolderLock
+from runtime.session.files import codec
+from runtime.session.files.lock import FolderLock
+from runtime.session.files.performance_file import read_performance, save_performance
 from runtime.session.performance import Performance
-from runtime.session.performance_file import read_performance, save_performance
 
 DOCUMENT = "session.json"
 PERFORMANCES, RECORDINGS, CHARACTERS = "performances", "recordings", "characters"
