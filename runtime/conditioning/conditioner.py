@@ -12,6 +12,7 @@ from devices.skeleton import Skeleton, SkeletonFrame
 from replay.fill import Filler, FillerState
 from runtime.conditioning.body_anatomy import BodyAnatomy, body_anatomy
 from runtime.conditioning.calibration_pose import CalibrationPose, CalibrationPoseState
+from runtime.conditioning.exact_joints import ExactJoints, ExactJointsState
 from runtime.conditioning.faults import Faults, FaultsState
 from runtime.conditioning.levelling import Levelling, LevellingState
 from runtime.conditioning.mirror import mirrored
@@ -55,6 +56,7 @@ class ConditionedFrame:
 class PerformerMemoryState:
     """The states of all steps for one performer, and the last frame's time [s]."""
 
+    exact: ExactJointsState
     faults: FaultsState
     rejoining: RejoiningState
     filter: OneEuroState
@@ -69,6 +71,7 @@ class _PerformerMemory:
 
     def __init__(self, skeleton: Skeleton, body: BodyAnatomy) -> None:
         count = len(skeleton.names)
+        self.exact = ExactJoints(skeleton)
         self.faults = Faults(body, count)
         self.rejoining = Rejoining(count)
         self.filter = OneEuroFilter()
@@ -80,6 +83,7 @@ class _PerformerMemory:
     def snapshot(self) -> PerformerMemoryState:
         """Return the states of all steps."""
         return PerformerMemoryState(
+            self.exact.snapshot(),
             self.faults.snapshot(),
             self.rejoining.snapshot(),
             self.filter.snapshot(),
@@ -91,6 +95,7 @@ class _PerformerMemory:
 
     def restore(self, state: PerformerMemoryState) -> None:
         """Go back to a snapshot."""
+        self.exact.restore(state.exact)
         self.faults.restore(state.faults)
         self.rejoining.restore(state.rejoining)
         self.filter.restore(state.filter)
@@ -180,7 +185,9 @@ class Conditioner:
         memory.at = frame.time
         positions, corrected, predicted = frame.positions, self._nothing, self._nothing
         if on.swaps or on.outliers:
-            mended = memory.faults.mend(positions, frame.time, swaps=on.swaps, outliers=on.outliers)
+            measured = not memory.exact.watch(positions, frame.rotations)
+            swaps, outliers = on.swaps and measured, on.outliers and measured
+            mended = memory.faults.mend(positions, frame.time, swaps=swaps, outliers=outliers)
             positions, corrected = mended.positions, mended.corrected
         whole = self._filler.place(positions, frame.time, frame.performer)
         positions, filled = whole.positions, whole.filled

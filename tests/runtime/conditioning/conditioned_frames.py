@@ -65,7 +65,8 @@ def clean(shared: Path) -> Recording:
 def spoilt(
     recording: Recording, at: slice, spoil: Callable[[np.ndarray], np.ndarray]
 ) -> list[SkeletonFrame]:
-    frames = frames_of(recording)
+    """As a sensor would see it: joints alone, some frames of them spoilt."""
+    frames = frames_of(replace(recording, rotations=None))
     for index in range(*at.indices(len(frames))):
         positions = spoil(frames[index].positions.copy())
         seen = np.isfinite(positions).all(axis=1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ import pytest
 from replay.builtin import builtin_recording
 from replay.formats import read_recording
 from runtime.conditioning.body_anatomy import body_anatomy
+from runtime.conditioning.exact_joints import ExactJoints
 from runtime.conditioning.switches import (
     for_live,
     for_recording,
@@ -69,6 +71,38 @@ def test_clean_motion_capture_passes_to_the_last_bit(shared: Path, name: str) ->
         strict=True,
     ):
         np.testing.assert_array_equal(out.positions, each.positions)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "rig/raylib_robot_RobotExpressive.glb",  # a hand turns by three metres in a frame
+        "rig/m2m_spider-animations.glb",
+        "bvh/cmu_daz_salsa_10.bvh",  # loops: the whole body jumps
+    ],
+)
+def test_exact_joints_are_believed_however_fast(shared: Path, name: str) -> None:
+    recording = read_recording(shared / name)
+    frames = [recording.frame(index) for index in range(len(recording))]
+    out = conditioned(frames, for_recording(), recording.skeleton)
+    np.testing.assert_array_equal(places(out), recording.positions)
+    measured = [replace(each, rotations=None) for each in frames]
+    out = conditioned(measured, for_recording(), recording.skeleton)
+    assert np.abs(places(out) - recording.positions).max() > 0.5, "a sensor's are not"
+
+
+def test_joints_whose_rotations_do_not_carry_them_are_measured() -> None:
+    """Noise of half a millimetre is enough, and frames that come twice prove nothing."""
+    rng = np.random.default_rng(1)
+    recording = builtin_recording("walk")
+    exact, noisy = ExactJoints(recording.skeleton), ExactJoints(recording.skeleton)
+    for index in range(20):
+        own = recording.frame(index)
+        assert exact.watch(own.positions, own.rotations) == (index > 0)
+        off = own.positions + rng.normal(scale=5e-4, size=own.positions.shape)
+        assert not noisy.watch(off, own.rotations)
+        assert not noisy.watch(off, own.rotations)
+        assert not noisy.watch(off, None)
 
 
 def test_a_glitchy_kinect_is_calmed(shared: Path) -> None:
