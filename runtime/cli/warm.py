@@ -35,6 +35,10 @@ from runtime.show.show import Show
 from runtime.status.progress import Progress
 from solvers.arap import ENERGIES
 from solvers.deform.skinning import SkinnedSurface
+from solvers.editing.clips_on_chains import Laid, with_clip
+from solvers.editing.motion import Clip, Motion
+from solvers.editing.part import part_of
+from solvers.editing.part_pose import pose_at
 from solvers.kernels.cache import count_compiled, has_list, remove_unused, save_list
 from solvers.linear.block_factor import BlockFactor
 from solvers.linear.nested_dissection import dissect
@@ -146,6 +150,7 @@ def use_solvers() -> None:
     link, joints, aside = np.array([0]), np.array([0, 1]), np.array([1.0, 0.0, 0.0])
     lift_segments(x[:2], unturned, link, joints, 0.5, aside, unturned)  # where wings hang only
     _stack_layers(Tree(np.array([-1, 0]), x[:2]))
+    _pose_part(x[:2])
 
 
 def _stack_layers(tree: Tree) -> None:
@@ -157,6 +162,16 @@ def _stack_layers(tree: Tree) -> None:
     layered.override(frame, 0.5)
     layered.add(frame, 0.5)
     layered.local(*layered.world())
+
+
+def _pose_part(points: NDArray[np.float64]) -> None:
+    """Pose a bone that plays two clips at once, as one does whose character was edited."""
+    still = np.tile(np.array([0.0, 0.0, 0.0, 1.0]), (1, 2, 1))
+    clip = Clip(Motion(np.zeros(1), np.array([0.0, 1.0]), still))
+    part = part_of(points, np.array([-1, 0]))
+    for _ in range(2):
+        part = with_clip(part, (0, 1), Laid(clip, 0.0, 1.0))
+    pose_at(part, 0.0)
 
 
 def _skin(points: NDArray[np.float64], faces: NDArray[np.int64]) -> None:
