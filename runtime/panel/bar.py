@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from imgui_bundle import icons_fontawesome_6 as icons
 from imgui_bundle import imgui
 
@@ -29,23 +31,12 @@ ICONS = {
     "help": icons.ICON_FA_CIRCLE_QUESTION,
 }
 SHORT = {"help": "Keys", "panel": "Hide", "match-again": "Match again"}
-WORDED = (
-    "accept",
-    "keep-match",
-    "record",
-    "match-again",
-    "hold",
-    "help",
-    "freeze",
-    "sliders",
-    "blackout",
-    "panel",
-    "audience",
-    "full-screen",
-)
-"""The buttons with words, as long as there is room for them: the first ones first."""
+ICONS_ALONE = ("home", "previous-match", "next-match")
 OF_WINDOW = ("sliders", "audience", "full-screen", "panel", "help")
+QUIET = ("full-screen", "audience", "panel")
+"""The buttons that give up their words, one after another, before the bar takes a second row."""
 TIME = 120.0  # [px] width of the line of time in a picture of the usual height
+PLACE = "place of the match"
 
 
 def draw_bar(status: ShowStatus, controls: ShowControls, margin: float, scale: float) -> float:
@@ -58,44 +49,78 @@ def draw_bar(status: ShowStatus, controls: ShowControls, margin: float, scale: f
 
 
 class _Bar:
-    """One drawing of the bar: its buttons from left to right, with words where they fit."""
+    """One drawing of the bar: its groups of buttons, in as many rows as they need."""
 
     def __init__(self, status: ShowStatus, controls: ShowControls, scale: float) -> None:
         self._controls, self._scale = controls, scale
         self._playback = None if status.session is not None else status.playback
         self._place = place_of_match(status, controls.match_controls.selected)
-        self._left = ["record", "freeze", "blackout", "match-again"]
-        if self._playback is not None:
-            self._left = ["home", "hold", *self._left]
-        self._chosen = ["previous-match", "next-match"] if self._place else []
-        self._deciding = []
+        playing = [] if self._playback is None else ["home", "hold"]
+        matching = ["previous-match", PLACE, "next-match"] if self._place else []
         if status.matching:
             going_on = any(each.performing for each in status.characters if each.matching)
-            self._deciding = ["accept", "keep-match"] if going_on else ["accept"]
-        self._words: set[str] = set()
-        self._words = self._fitting_words()
+            matching += ["accept", "keep-match"] if going_on else ["accept"]
+        groups = [playing, ["record", "freeze", "blackout", "match-again"], matching]
+        self._groups = [group for group in groups if group]
+        self._gap = float(imgui.get_style().item_spacing.x)
+        self._silent: set[str] = set(ICONS_ALONE)
+        self._rows = self._laid_out(imgui.get_content_region_avail().x)
 
     def draw(self) -> None:
-        """Draw it into the window that is begun."""
+        """Draw it into the window that is begun; the window's own buttons end at the right."""
         end = imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x
-        for number, name in enumerate(self._left):
-            if number:
-                imgui.same_line()
-            self._button(name)
-            if name == "hold" and self._playback is not None:
-                self._draw_time(self._playback)
-        if self._place:
-            self._draw_place()
-        for name in self._deciding:
-            imgui.same_line()
-            self._button(name)
-        widths = [self._width(name) + imgui.get_style().item_spacing.x for name in OF_WINDOW]
-        imgui.same_line()
-        imgui.set_cursor_pos_x(max(end - sum(widths), imgui.get_cursor_pos_x()))
-        for number, name in enumerate(OF_WINDOW):
-            if number:
-                imgui.same_line()
-            self._button(name)
+        for row in self._rows:
+            for number, name in enumerate(row):
+                if number:
+                    imgui.same_line()
+                if name == OF_WINDOW[0]:
+                    imgui.set_cursor_pos_x(
+                        max(end - self._length(OF_WINDOW), imgui.get_cursor_pos_x())
+                    )
+                self._draw(name)
+
+    def _laid_out(self, room: float) -> list[list[str]]:
+        """The rows of what fits into `room` [px]; a group begins a new row where it has to."""
+        everything = [name for group in self._groups for name in group] + list(OF_WINDOW)
+        for name in ("", *QUIET):
+            self._silent.add(name)
+            if self._length(everything) <= room:
+                return [everything]
+        self._silent -= set(QUIET)
+        rows: list[list[str]] = [[]]
+        for group in (*self._groups, list(OF_WINDOW)):
+            if rows[-1] and self._length([*rows[-1], *group]) > room:
+                rows.append([])
+            for name in group:
+                if rows[-1] and self._length([*rows[-1], name]) > room:
+                    rows.append([])
+                rows[-1].append(name)
+        return rows
+
+    def _length(self, names: Sequence[str]) -> float:
+        """How long a row of these is [px]."""
+        return sum(self._width(name) for name in names) + self._gap * (len(names) - 1)
+
+    def _width(self, name: str) -> float:
+        """How wide a button is, with the line of time where it belongs to it [px]."""
+        if name == PLACE:
+            return float(imgui.calc_text_size(self._place).x)
+        words = " ".join(part for part in (self._icon(name), self._word(name)) if part)
+        width: float = imgui.calc_text_size(words).x + 2.0 * imgui.get_style().frame_padding.x
+        if name == "hold" and self._playback is not None:
+            width += TIME * self._scale + imgui.calc_text_size(_time(self._playback)).x
+            width += 2.0 * self._gap
+        return width
+
+    def _draw(self, name: str) -> None:
+        if name == PLACE:
+            imgui.align_text_to_frame_padding()
+            imgui.text(self._place)
+            return
+        lights = name not in ("hold", "panel")
+        button(name, self._controls, icon=self._icon(name), label=self._word(name), lights=lights)
+        if name == "hold" and self._playback is not None:
+            self._draw_time(self._playback)
 
     def _draw_time(self, playback: PlaybackStatus) -> None:
         imgui.same_line()
@@ -109,28 +134,14 @@ class _Bar:
         imgui.align_text_to_frame_padding()
         imgui.text(_time(playback))
 
-    def _draw_place(self) -> None:
-        imgui.same_line()
-        self._button("previous-match")
-        imgui.same_line()
-        imgui.align_text_to_frame_padding()
-        imgui.text(self._place)
-        imgui.same_line()
-        self._button("next-match")
-
-    def _button(self, name: str) -> None:
-        lights = name not in ("hold", "panel")
-        button(name, self._controls, icon=self._icon(name), label=self._word(name), lights=lights)
-
     def _icon(self, name: str) -> str:
         if name == "hold":
             return icons.ICON_FA_PLAY if self._paused else icons.ICON_FA_PAUSE
         return ICONS[name]
 
     def _word(self, name: str) -> str:
-        return self._usual_word(name) if name in self._words else ""
-
-    def _usual_word(self, name: str) -> str:
+        if name in self._silent:
+            return ""
         if name == "hold":
             return "Play" if self._paused else "Pause"
         return SHORT.get(name, ACTIONS[name].label)
@@ -138,29 +149,6 @@ class _Bar:
     @property
     def _paused(self) -> bool:
         return self._playback is not None and self._playback.paused
-
-    def _width(self, name: str) -> float:
-        words = " ".join(part for part in (self._icon(name), self._word(name)) if part)
-        width: float = imgui.calc_text_size(words).x + 2.0 * imgui.get_style().frame_padding.x
-        return width
-
-    def _fitting_words(self) -> set[str]:
-        """The buttons that have room for words besides their icons."""
-        gap = imgui.get_style().item_spacing.x
-        names = [*self._left, *self._chosen, *self._deciding, *OF_WINDOW]
-        taken = sum(self._width(name) + gap for name in names) + gap
-        if self._playback is not None:
-            taken += TIME * self._scale + imgui.calc_text_size(_time(self._playback)).x + 2.0 * gap
-        if self._place:
-            taken += imgui.calc_text_size(self._place).x + gap
-        room = imgui.get_content_region_avail().x - taken
-        words: set[str] = set()
-        for name in WORDED:
-            width = imgui.calc_text_size(f" {self._usual_word(name)}").x
-            if name in names and width <= room:
-                words.add(name)
-                room -= width
-        return words
 
 
 def _time(playback: PlaybackStatus) -> str:

@@ -19,6 +19,7 @@ ICONS = FONTS / "Font_Awesome_6_Free-Solid-900.otf"
 
 LETTER = 17.0  # [px] height of letters in a picture of the usual height
 USUAL_HEIGHT = 720.0  # [px]
+LEAST_WIDTH = 960.0  # [px] of a picture of the usual height; a narrower one has smaller letters
 LONGEST_STEP = 0.1  # [s] that ImGui's animations may go on by at once
 
 KEYS = {
@@ -125,7 +126,7 @@ class Gui:
     def begin(self, size: tuple[int, int], seconds: float) -> None:
         """Begin to lay out widgets in a picture of `size` [px], `seconds` after the last time."""
         self._enter()
-        self._fit(size[1] / USUAL_HEIGHT)
+        self._fit(min(size[0] / LEAST_WIDTH, size[1] / USUAL_HEIGHT))
         io = imgui.get_io()
         io.display_size = ImVec2(*size)
         io.delta_time = min(max(seconds, 1e-4), LONGEST_STEP)

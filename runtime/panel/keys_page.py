@@ -1,6 +1,9 @@
-"""The page of all keys."""
+"""The page of all keys: in groups, in as many columns as fit, with what each does where it fits."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
@@ -8,133 +11,234 @@ from runtime.control.actions import ACTIONS
 from runtime.control.keys import KEYS
 from runtime.control.session_actions import SESSION_ACTIONS
 from runtime.control.show_controls import ShowControls
-from runtime.panel.gui import GOLD
-from runtime.panel.widgets import card, heading, letters
+from runtime.panel.gui import GOLD, PAPER
+from runtime.panel.widgets import card, letters
 
-COLUMNS: tuple[dict[str, tuple[str, ...]], ...] = (
-    {
-        "Matching": (
-            "match-again",
-            "accept",
-            "next-match",
-            "previous-match",
-            "keep-match",
-            "rest-pose",
-            "calibrate",
-        ),
-        "Playing": ("hold", "home", "freeze", "select", "leave"),
-        "Recording": (
-            "record",
-            "rehearse",
-            "undo",
-            "redo",
-            "retake",
-            "recall",
-            "save",
-            "loop",
-            "half-speed",
-        ),
-    },
-    {
-        "Look": (
-            "help",
-            "panel",
-            "sliders",
-            "frame-all",
-            "front",
-            "chains",
-            "full-screen",
-            "audience",
-            "blackout",
-            "in-place",
-        ),
-        "Surface": (
-            "cartoon-up",
-            "cartoon-down",
-            "volume-up",
-            "volume-down",
-            "stiffness-up",
-            "stiffness-down",
-        ),
-        "Corrections": (
-            "mirror",
-            "filter",
-            "predict",
-            "outliers",
-            "swaps",
-            "identities",
-            "level",
-            "scale",
-            "recalibrate",
-            "order",
-        ),
-    },
-)
-"""The groups of actions in each column, those most used first."""
+GROUPS: dict[str, tuple[str, ...]] = {
+    "Matching": (
+        "match-again",
+        "accept",
+        "next-match",
+        "previous-match",
+        "keep-match",
+        "rest-pose",
+        "calibrate",
+    ),
+    "Playing": ("hold", "home", "loop", "freeze", "select", "leave"),
+    "Recording": (
+        "record",
+        "rehearse",
+        "undo",
+        "redo",
+        "retake",
+        "recall",
+        "save",
+        "half-speed",
+    ),
+    "Look": (
+        "help",
+        "panel",
+        "sliders",
+        "frame-all",
+        "front",
+        "chains",
+        "full-screen",
+        "audience",
+        "blackout",
+        "in-place",
+    ),
+    "Surface": (
+        "cartoon-up",
+        "cartoon-down",
+        "volume-up",
+        "volume-down",
+        "stiffness-up",
+        "stiffness-down",
+    ),
+    "Corrections": (
+        "mirror",
+        "filter",
+        "predict",
+        "outliers",
+        "swaps",
+        "identities",
+        "level",
+        "scale",
+        "recalibrate",
+        "order",
+    ),
+}
+"""The groups of actions, those most used first."""
 
 SPELLED = {".": ". dot", ",": ", comma"}
-TEXT = 350.0  # [px] the longest line of a text in a picture of the usual height
 MOUSE = (
-    ("left button", "turn round the stage"),
-    ("right button", "shift the picture"),
-    ("wheel", "nearer or farther"),
+    ("left button", "Turn", "go round the stage"),
+    ("right button", "Shift", "move the picture"),
+    ("wheel", "Zoom", "go nearer or farther"),
 )
+TRIED = (
+    *((size, columns, True) for size in (1.0, 0.92, 0.84) for columns in (2, 3)),
+    *((size, columns, False) for size in (1.0, 0.92, 0.84) for columns in (2, 3, 4)),
+)
+"""What is tried until the page fits: height of letters, columns, and whether texts are shown."""
+SMALLEST = (0.84, (3, 2, 1))  # height of letters and columns of a page that scrolls
+LEAST_TEXT = 11.0  # the shortest line of a text, in heights of its letters
+
+Row = tuple[str, str, str]  # key, label and text
+Group = tuple[str, Sequence[Row]]
 
 
-def draw_keys(controls: ShowControls, left: float, margin: float, scale: float) -> None:
-    """Draw every key with what it does, in groups, from `left` [px] on; a click closes it."""
+@dataclass(frozen=True, slots=True)
+class _Layout:
+    """How the page is laid out; lengths in [px].
+
+    Attributes:
+        letters: times the usual height of letters.
+        texts: whether texts are shown beside the labels.
+        columns: the groups of each column.
+        column: width of a column with its gap.
+        label, text: where labels and texts begin in it.
+        height: of the longest column.
+        fits: whether no label is wider than its column.
+    """
+
+    letters: float
+    texts: bool
+    columns: Sequence[Sequence[Group]]
+    column: float
+    label: float
+    text: float
+    height: float
+    fits: bool
+
+
+def draw_keys(controls: ShowControls, margin: float) -> None:
+    """Draw every key with what it does over the picture; a click closes the page."""
     screen = imgui.get_io().display_size
-    width, height = screen.x - left - margin, screen.y - 2.0 * margin
-    spacing = imgui.get_style().item_spacing
-    with card("keys", left, margin, width, opacity=0.96, most=height):
+    groups = _groups(in_session=controls.session is not None)
+    width, most = screen.x - 2.0 * margin, screen.y - 2.0 * margin
+    with card("keys", margin, margin, width, opacity=0.96, most=most):
         with letters(1.4):
             imgui.text("Keys")
         imgui.same_line()
         imgui.text_disabled("  ? or a click closes this page")
-        imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(spacing.x, 0.45 * spacing.y))
-        if imgui.begin_table("columns", len(COLUMNS)):
-            for column, groups in enumerate(_columns(in_session=controls.session is not None)):
-                imgui.table_next_column()
-                for name, rows in groups:
-                    heading(name)
-                    _draw_rows(f"{name}{column}", rows, scale)
-                    imgui.dummy(ImVec2(0.0, 2.0 * scale))
-            imgui.end_table()
-        imgui.pop_style_var()
+        padding = imgui.get_style().window_padding
+        top = imgui.get_cursor_pos_y()
+        layout = _fitting(groups, width - 2.0 * padding.x, most - top - padding.y)
+        with letters(layout.letters):
+            for number, column in enumerate(layout.columns):
+                _draw_column(column, layout, padding.x + number * layout.column, top)
         if imgui.is_window_hovered() and imgui.is_mouse_clicked(0):
             controls.view.help = False
 
 
-def _columns(*, in_session: bool) -> list[list[tuple[str, list[tuple[str, str]]]]]:
-    """Each column's groups, with their rows of keys and texts; keys of no group come after them.
-
-    Without a session, its keys are left out.
-    """
+def _groups(*, in_session: bool) -> list[Group]:
+    """The groups with their rows, those of a session only in one; keys of no group come last."""
     idle = set() if in_session else set(SESSION_ACTIONS) - {"loop"}
     key_of = {name: key for key, name in KEYS.items() if name not in idle}
-    grouped = [name for groups in COLUMNS for names in groups.values() for name in names]
+    grouped = [name for names in GROUPS.values() for name in names]
     rest = [name for name in key_of if name not in grouped]
-    columns = [
-        [
-            (group, [(key_of[name], ACTIONS[name].text) for name in names if name in key_of])
-            for group, names in groups.items()
+    named = {**GROUPS, "More": tuple(rest)}
+    groups: list[Group] = []
+    for group, names in named.items():
+        rows = [
+            (SPELLED.get(key_of[name], key_of[name]), ACTIONS[name].label, ACTIONS[name].text)
+            for name in names
+            if name in key_of
         ]
-        for groups in COLUMNS
-    ]
-    if rest:
-        columns[0].append(("More", [(key_of[name], ACTIONS[name].text) for name in rest]))
-    columns[0].append(("Mouse", list(MOUSE)))
-    return columns
+        if rows:
+            groups.append((group, rows))
+    groups.append(("Mouse", list(MOUSE)))
+    return groups
 
 
-def _draw_rows(name: str, rows: list[tuple[str, str]], scale: float) -> None:
-    if not imgui.begin_table(name, 2, imgui.TableFlags_.sizing_fixed_fit, ImVec2(0.0, 0.0)):
-        return
-    for key, text in rows:
-        imgui.table_next_column()
-        imgui.text_colored(ImVec4(*GOLD, 1.0), SPELLED.get(key, key))
-        imgui.table_next_column()
-        imgui.push_text_wrap_pos(imgui.get_cursor_pos().x + TEXT * scale)
-        imgui.text(text)
-        imgui.pop_text_wrap_pos()
-    imgui.end_table()
+def _fitting(groups: Sequence[Group], width: float, height: float) -> _Layout:
+    """The first layout that fits into so many pixels; else one that scrolls."""
+    for size, columns, texts in TRIED:
+        layout = _laid_out(groups, width, size, columns, texts=texts)
+        if layout.fits and layout.height <= height:
+            return layout
+    size, counts = SMALLEST
+    layouts = [_laid_out(groups, width, size, columns, texts=False) for columns in counts]
+    return next((layout for layout in layouts if layout.fits), layouts[-1])
+
+
+def _laid_out(
+    groups: Sequence[Group], width: float, size: float, columns: int, *, texts: bool
+) -> _Layout:
+    with letters(size):
+        line, gap = imgui.get_text_line_height(), imgui.get_style().item_spacing.x
+        rows = [row for _, own in groups for row in own]
+        label = max(imgui.calc_text_size(key).x for key, _, _ in rows) + 1.5 * gap
+        text = label + max(imgui.calc_text_size(words).x for _, words, _ in rows) + 1.5 * gap
+        column = (width + 3.0 * gap) / columns
+        own = column - 3.0 * gap
+        fits = own - text >= LEAST_TEXT * line if texts else own >= text - 1.5 * gap
+        layout = _Layout(size, texts, (), column, label, text, 0.0, fits)
+        if not fits:
+            return layout
+        heights = [_height(group, layout) for group in groups]
+    limit = max(*heights, sum(heights) / columns)
+    while len(shared := _shared(heights, limit)) > columns:
+        limit += line
+    return replace(
+        layout,
+        columns=[[groups[number] for number in part] for part in shared],
+        height=max(sum(heights[number] for number in part) for part in shared),
+    )
+
+
+def _shared(heights: Sequence[float], limit: float) -> list[list[int]]:
+    """The numbers of the groups in each column, each as full as the limit [px] allows."""
+    shared: list[list[int]] = [[]]
+    filled = 0.0
+    for number, height in enumerate(heights):
+        if shared[-1] and filled + height > limit:
+            shared.append([])
+            filled = 0.0
+        shared[-1].append(number)
+        filled += height
+    return shared
+
+
+def _height(group: Group, layout: _Layout) -> float:
+    """How high a group is with the room below it, in the letters that are set [px]."""
+    line = imgui.get_text_line_height()
+    return 1.6 * line + sum(_row_height(row, layout) for row in group[1])
+
+
+def _row_height(row: Row, layout: _Layout) -> float:
+    line = imgui.get_text_line_height()
+    if not layout.texts:
+        return 1.22 * line
+    return float(imgui.calc_text_size(row[2], False, _text_room(layout)).y) + 0.22 * line
+
+
+def _text_room(layout: _Layout) -> float:
+    """How long a line of a text may be [px]."""
+    return layout.column - 3.0 * imgui.get_style().item_spacing.x - layout.text
+
+
+def _draw_column(groups: Sequence[Group], layout: _Layout, left: float, top: float) -> None:
+    line, y = imgui.get_text_line_height(), top
+    gold = ImVec4(*GOLD, 1.0)
+    for name, rows in groups:
+        imgui.set_cursor_pos(ImVec2(left, y))
+        imgui.text_colored(ImVec4(*PAPER, 0.62), name.upper())
+        y += 1.2 * line
+        for row in rows:
+            imgui.set_cursor_pos(ImVec2(left, y))
+            imgui.begin_group()
+            imgui.text_colored(gold, row[0])
+            imgui.set_cursor_pos(ImVec2(left + layout.label, y))
+            imgui.text(row[1])
+            imgui.end_group()
+            if layout.texts:
+                imgui.set_cursor_pos(ImVec2(left + layout.text, y))
+                imgui.push_text_wrap_pos(left + layout.text + _text_room(layout))
+                imgui.text_colored(ImVec4(*PAPER, 0.62), row[2])
+                imgui.pop_text_wrap_pos()
+            elif imgui.is_item_hovered():
+                imgui.set_tooltip(row[2])
+            y += _row_height(row, layout)
+        y += 0.4 * line

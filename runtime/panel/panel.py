@@ -18,7 +18,7 @@ from runtime.panel.legend import WIDTH as LEGEND
 from runtime.panel.legend import draw_legend
 from runtime.panel.sliders import WIDTH as SLIDERS
 from runtime.panel.sliders import draw_sliders
-from runtime.panel.status_card import HEIGHT as STATUS_HEIGHT
+from runtime.panel.status_card import LEAST as STATUS_LEAST
 from runtime.panel.status_card import draw_countdown, draw_notices, draw_status
 from runtime.panel.timeline import Timeline
 from runtime.status.show_status import ShowStatus
@@ -59,8 +59,8 @@ class Panel:
         self._timeline = Timeline()
         self._shown: ShowStatus | None = None
         self._read = -math.inf
-        self._above = 0.0
-        self._panel, self._sliders = Ramp(UNFOLDS, clock), Ramp(UNFOLDS, clock)
+        self._taken = (0.0, 0.0, 0.0, 0.0)
+        self._sides = [Ramp(UNFOLDS, clock) for _ in self._taken]
 
     def draw(self, target: moderngl.Framebuffer) -> None:
         """Lay out the panel, do what is pressed on it, and draw it over `target`."""
@@ -77,39 +77,50 @@ class Panel:
     def _lay_out(self) -> None:
         status, controls, scale = self._newest_status(), self._controls, self.gui.scale
         margin = MARGIN * scale
-        inset = 0.0 if controls.scene is None else controls.scene.inset_side
-        self._take_room(margin)
+        self._take_room()
         if controls.view.help:
-            draw_keys(controls, margin + inset, margin, scale)
-            return
-        above = margin
-        if controls.view.panel:
-            draw_status(status, inset + margin, scale, margin)
-            above = draw_bar(status, controls, margin, scale)
-            if controls.session is not None:
-                above += self._timeline.draw(controls, margin, above - margin, scale)
-            self._above = above
-            draw_legend(status, controls, margin, scale, inset, above)
-            if controls.view.sliders:
-                draw_sliders(controls, margin, scale, above)
-        draw_countdown(status, scale)
-        draw_notices(controls.notices.current, above, scale)
+            draw_keys(controls, margin)
+        elif controls.view.panel:
+            self._lay_cards(status, margin)
+        else:
+            draw_notices(controls.notices.current, margin, scale)
+        if not controls.view.help:
+            draw_countdown(status, scale)
 
-    def _take_room(self, margin: float) -> None:
-        """Let the scene draw all that is framed clear of the panel, as much as it is shown now."""
-        view, scene, scale = self._controls.view, self._controls.scene, self.gui.scale
+    def _lay_cards(self, status: ShowStatus, margin: float) -> None:
+        """Lay out the cards along the borders of the picture; note how much of it they take."""
+        controls, scale = self._controls, self.gui.scale
+        screen, sliders = imgui.get_io().display_size, controls.view.sliders
+        inset = 0.0 if controls.scene is None else controls.scene.inset_side
+        left, right = inset + margin, margin
+        column = margin + SLIDERS * scale
+        beside = sliders and screen.x - left - column - margin >= STATUS_LEAST * scale
+        width = screen.x - left - right - (column if beside else 0.0)
+        below = draw_status(status, controls.notices.current, left, width, margin, scale)
+        above = draw_bar(status, controls, margin, scale)
+        if controls.session is not None:
+            above += self._timeline.draw(controls, margin, above - margin, scale)
+        draw_legend(status, controls, margin, scale, inset, above)
+        if sliders:
+            draw_sliders(controls, margin, scale, margin if beside else below + margin, above)
+        self._taken = (
+            max(inset, margin + LEGEND * scale) / screen.x,
+            column / screen.x if sliders else 0.0,
+            below / screen.y,
+            (above - margin) / screen.y,
+        )
+
+    def _take_room(self) -> None:
+        """Let the scene draw all that is framed clear of the panel, as far as it has unfolded."""
+        scene, shown = self._controls.scene, self._controls.view.panel
         if scene is None:
             return
-        for ramp, on in ((self._panel, view.panel), (self._sliders, view.panel and view.sliders)):
-            if ramp.target != on:
-                ramp.to(float(on))
-        width, height = imgui.get_io().display_size
-        panel, sliders = self._panel.level, self._sliders.level
-        left = panel * max(scene.inset_side, margin + LEGEND * scale)
-        top = panel * (margin + STATUS_HEIGHT * scale)
-        right = sliders * (margin + SLIDERS * scale)
-        bottom = panel * (self._above - margin)
-        scene.taken = (left / width, right / width, top / height, bottom / height)
+        for ramp, share in zip(self._sides, self._taken, strict=True):
+            wanted = min(share, 1.0) if shown else 0.0
+            if ramp.target != wanted:
+                ramp.to(wanted)
+        left, right, top, bottom = (ramp.level for ramp in self._sides)
+        scene.taken = (left, right, top, bottom)
 
     def _newest_status(self) -> ShowStatus:
         """The state of the show, read as often as anybody could follow."""

@@ -13,12 +13,17 @@ WIDTH = 250.0  # [px] in a picture of the usual height
 OF_CHARACTERS = ("in-place", "chains")
 
 
-def draw_sliders(controls: ShowControls, margin: float, scale: float, above: float) -> None:
-    """Draw the column at the right, down to `above` the lower border of the picture [px]."""
-    most = imgui.get_io().display_size.y - above - margin
+def draw_sliders(
+    controls: ShowControls, margin: float, scale: float, top: float, above: float
+) -> None:
+    """Draw the column at the right, from `top` to `above` the lower border of the picture [px].
+
+    It scrolls where there is too much.
+    """
+    most = imgui.get_io().display_size.y - above - top
     spacing = imgui.get_style().item_spacing
     imgui.push_style_var(imgui.StyleVar_.item_spacing, ImVec2(spacing.x, 0.5 * spacing.y))
-    with card("sliders", -margin, margin, WIDTH * scale, most=most):
+    with card("sliders", -margin, top, WIDTH * scale, most=most):
         heading(fitted(_whose(controls), imgui.get_content_region_avail().x))
         for name in SLIDERS:
             fader(name, controls)

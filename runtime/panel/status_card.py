@@ -1,4 +1,4 @@
-"""The card with what the show sees and what to do next, and the notices beside it."""
+"""The card with what the show sees, what to do next, and what has just happened."""
 
 from __future__ import annotations
 
@@ -24,26 +24,39 @@ SIGHTS: dict[Sight, Colour] = {
     Sight.ENDED: GREY,
 }
 WIDTH = 700.0  # [px] in a picture of the usual height
-HEIGHT = 86.0  # [px] likewise, with one line of advice
+LEAST = 320.0  # [px] likewise, below which nothing stands beside it
 HEADLINE = 1.65  # times the height of usual letters
 ADVICE = 1.1
 COUNTDOWN = 9.0
+LEAST_DETAILS = 90.0  # [px] in a picture of the usual height
 
 
-def draw_status(status: ShowStatus, left: float, scale: float, margin: float) -> None:
-    """Draw the card at the top, from `left` [px] on, the files that are being recorded in it."""
-    screen = imgui.get_io().display_size
-    width = min(WIDTH * scale, screen.x - left - margin)
-    with card("status", left, margin, width):
+def draw_status(
+    status: ShowStatus,
+    notices: Sequence[Notice],
+    left: float,
+    width: float,
+    margin: float,
+    scale: float,
+) -> float:
+    """Draw the card at the top, from `left` on, up to `width` wide [px], with all its lines.
+
+    Return where it ends below, without the notices, which come and go [px].
+    """
+    with card("status", left, margin, min(WIDTH * scale, width)):
         with letters(HEADLINE):
             dot(_light(status), 8.0 * scale)
             imgui.text(fitted(headline(status), imgui.get_content_region_avail().x))
             line = imgui.get_text_line_height()
         imgui.same_line(0.0, 14.0 * scale)
-        imgui.set_cursor_pos_y(
-            imgui.get_cursor_pos_y() + 0.7 * (line - imgui.get_text_line_height())
-        )
-        imgui.text_disabled(fitted(details(status), imgui.get_content_region_avail().x))
+        room = imgui.get_content_region_avail().x
+        if room > LEAST_DETAILS * scale:
+            imgui.set_cursor_pos_y(
+                imgui.get_cursor_pos_y() + 0.7 * (line - imgui.get_text_line_height())
+            )
+            imgui.text_disabled(fitted(details(status), room))
+        else:
+            imgui.new_line()
         with letters(ADVICE):
             imgui.push_text_wrap_pos(0.0)
             imgui.text(advice(status))
@@ -51,6 +64,9 @@ def draw_status(status: ShowStatus, left: float, scale: float, margin: float) ->
         for take in status.recording:
             dot(LACQUER, 6.0 * scale)
             imgui.text(f"recording {take.path.name}: {clock(take.seconds)}, {take.frames} frames")
+        below = imgui.get_cursor_screen_pos().y - imgui.get_style().item_spacing.y
+        _draw_lines(notices, scale)
+    return float(below + imgui.get_style().window_padding.y)
 
 
 def _light(status: ShowStatus) -> Colour:
@@ -78,17 +94,22 @@ def draw_countdown(status: ShowStatus, scale: float) -> None:
         paint.add_text(at, imgui.get_color_u32(ImVec4(*PAPER, fade)), text)
 
 
-def draw_notices(notices: Sequence[Notice], above: float, scale: float) -> None:
-    """Draw what happened last, the newest lowest, `above` the lower border of the picture [px]."""
+def draw_notices(notices: Sequence[Notice], margin: float, scale: float) -> None:
+    """Draw what happened last on a card of its own, where no panel is shown."""
     if not notices:
         return
     screen = imgui.get_io().display_size
     widest = max(imgui.calc_text_size(notice.text).x for notice in notices)
     width = min(widest + 56.0 * scale, screen.x - 40.0 * scale)
-    with card("notices", (screen.x - width) / 2.0, -above, width):
-        for notice in notices:
-            dot(LACQUER if notice.fault else GOLD, 4.0 * scale)
-            imgui.text_wrapped(notice.text)
+    with card("notices", (screen.x - width) / 2.0, -margin, width):
+        _draw_lines(notices, scale)
+
+
+def _draw_lines(notices: Sequence[Notice], scale: float) -> None:
+    """A line for each notice, the newest lowest."""
+    for notice in notices:
+        dot(LACQUER if notice.fault else GOLD, 4.0 * scale)
+        imgui.text_wrapped(notice.text)
 
 
 def clock(seconds: float) -> str:

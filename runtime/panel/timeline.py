@@ -10,10 +10,11 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from imgui_bundle import icons_fontawesome_6 as icons
 
 from devices.errors import InputError
+from runtime.control.actions import ACTIONS
 from runtime.control.show_controls import ShowControls
 from runtime.panel.gui import GOLD, INK, LACQUER, PAPER
 from runtime.panel.status_card import clock
-from runtime.panel.widgets import Colour, button, card
+from runtime.panel.widgets import Colour, beside, button, card
 from runtime.session import edits
 from runtime.session.document import Clip, Session
 from runtime.session.live_session import LiveSession
@@ -23,6 +24,7 @@ LAYERS = 5  # rows that are shown at once; the wheel goes to the others
 ROW = 22.0  # [px] in a picture of the usual height
 RULER = 20.0
 NAMES = 110.0
+WEIGHT = 90.0  # of the slider of a clip's weight
 EDGE = 6.0  # [px] at either end of a bar that drag its end
 LEAST = 10.0  # [s] that are shown at least
 STEPS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0, 60.0, 300.0, 1800.0)  # [s] between two ticks
@@ -95,29 +97,22 @@ class Timeline:
         transport = session.transport
         playing = transport.mode is Mode.PLAYING
         button("home", controls, icon=icons.ICON_FA_BACKWARD_STEP, label="")
-        imgui.same_line()
         icon = icons.ICON_FA_PAUSE if playing else icons.ICON_FA_PLAY
-        button("hold", controls, icon=icon, label="Pause" if playing else "Play", lights=False)
-        imgui.same_line()
-        button("rehearse", controls, icon=icons.ICON_FA_STOP, lights=False)
-        imgui.same_line()
-        button("loop", controls, icon=icons.ICON_FA_REPEAT, label="")
-        imgui.same_line(0.0, 16.0 * scale)
+        _next("hold", controls, icon, label="Pause" if playing else "Play", lights=False)
+        _next("rehearse", controls, icons.ICON_FA_STOP, lights=False)
+        _next("loop", controls, icons.ICON_FA_REPEAT, label="")
+        words = f"{_precise(transport.position)} / {clock(transport.duration)}"
+        beside(words, 16.0 * scale)
         imgui.align_text_to_frame_padding()
-        imgui.text(f"{_precise(transport.position)} / {clock(transport.duration)}")
-        imgui.same_line(0.0, 16.0 * scale)
-        button("undo", controls, icon=icons.ICON_FA_ROTATE_LEFT, label="")
-        imgui.same_line()
-        button("redo", controls, icon=icons.ICON_FA_ROTATE_RIGHT, label="")
-        imgui.same_line()
-        button("retake", controls, icon=icons.ICON_FA_ARROWS_ROTATE)
-        imgui.same_line()
-        button("recall", controls, icon=icons.ICON_FA_CLOCK_ROTATE_LEFT)
-        imgui.same_line()
-        button("save", controls, icon=icons.ICON_FA_FLOPPY_DISK, label="")
+        imgui.text(words)
+        _next("undo", controls, icons.ICON_FA_ROTATE_LEFT, label="", gap=16.0 * scale)
+        _next("redo", controls, icons.ICON_FA_ROTATE_RIGHT, label="")
+        _next("retake", controls, icons.ICON_FA_ARROWS_ROTATE)
+        _next("recall", controls, icons.ICON_FA_CLOCK_ROTATE_LEFT)
+        _next("save", controls, icons.ICON_FA_FLOPPY_DISK, label="")
         clip = self._chosen(session.session)
         if clip is not None:
-            imgui.same_line(0.0, 24.0 * scale)
+            beside("mute", 24.0 * scale)
             self._draw_clip(session, clip, scale)
 
     def _draw_clip(self, session: LiveSession, clip: Clip, scale: float) -> None:
@@ -126,26 +121,29 @@ class Timeline:
         number = clip.id
         if _toggle("mute", clip.muted):
             self._do(session, edits.muted(document, number, not clip.muted), "mute a clip")
+        beside("solo")
         if _toggle("solo", clip.solo):
             self._do(session, edits.soloed(document, number, not clip.solo), "solo a clip")
+        beside("add")
         if _toggle("add", clip.additive):
             added = edits.made_additive(document, number, not clip.additive)
             self._do(session, added, "add a clip")
-        imgui.set_next_item_width(90.0 * scale)
+        beside("a weight of 100 %")
+        imgui.set_next_item_width(WEIGHT * scale)
         changed, weight = imgui.slider_float("##weight", 100.0 * clip.weight, 0.0, 100.0, "%.0f %%")
         if changed:
             counted = edits.weighted(document, number, min(max(weight / 100.0, 0.0), 1.0))
             session.drag(counted, f"weigh clip {number}")
         if imgui.is_item_deactivated_after_edit():
             session.drop()
-        imgui.same_line()
+        beside("cut")
         if imgui.button("cut"):
             self._try(session, lambda: edits.split(document, number, position), "cut a clip")
-        imgui.same_line()
+        beside("copy")
         if imgui.button("copy"):
             self._do(session, edits.copied(document, number, position), "copy a clip")
             self.selected = session.session.clips[-1].id
-        imgui.same_line()
+        beside("remove")
         if imgui.button("remove"):
             self._do(session, edits.without_clip(document, number), "remove a clip")
             self.selected = None
@@ -328,6 +326,21 @@ def _manner(clip: Clip) -> str:
     return "".join(f", {each}" for each in said if each)
 
 
+def _next(
+    name: str,
+    controls: ShowControls,
+    icon: str,
+    *,
+    label: str | None = None,
+    lights: bool = True,
+    gap: float = -1.0,
+) -> None:
+    """The button of an action beside the one before, or below where there is no room."""
+    words = ACTIONS[name].label if label is None else label
+    beside(f"{icon} {words}" if words else icon, gap)
+    button(name, controls, icon=icon, label=label, lights=lights)
+
+
 def _toggle(label: str, on: bool) -> bool:
     """A button that is lit while it is on; whether it was pressed."""
     if on:
@@ -335,7 +348,6 @@ def _toggle(label: str, on: bool) -> bool:
     pressed: bool = imgui.button(label)
     if on:
         imgui.pop_style_color()
-    imgui.same_line()
     return pressed
 
 

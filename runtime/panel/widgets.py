@@ -79,6 +79,16 @@ def button(
     hint(name)
 
 
+def beside(words: str, gap: float = -1.0) -> None:
+    """Let the next button, with these words on it, stand beside the last one, if it fits there."""
+    style = imgui.get_style()
+    between = style.item_spacing.x if gap < 0.0 else gap
+    width = imgui.calc_text_size(words).x + 2.0 * style.frame_padding.x
+    end = imgui.get_window_pos().x + imgui.get_window_size().x - style.window_padding.x
+    if imgui.get_item_rect_max().x + between + width <= end:
+        imgui.same_line(0.0, between)
+
+
 def hint(name: str) -> None:
     """What the widget before does, and its key, at once while the mouse is over it."""
     if imgui.is_item_hovered():

@@ -9,6 +9,7 @@ from pathlib import Path
 import moderngl
 import numpy as np
 import pytest
+from imgui_bundle import imgui
 from numpy.typing import NDArray
 
 from replay.player import EveryFrame, Player
@@ -26,15 +27,20 @@ from tests.runtime.staged import StagedShow
 from tests.runtime.stick_figures import make_figure, record, waving
 
 SIZE = (1280, 720)
+SMALL = (800, 600)
+SIZES = (SMALL, SIZE, (1920, 1080), (3840, 2160))
+DOUBLE = 27  # a pixel over which two cards lie is darker than this, one under a single card is not
 LETTER_HEIGHT = 9  # [px] the lowest that can be read
 
 
 class Screen:
     """A panel over a grey picture, and a mouse."""
 
-    def __init__(self, context: moderngl.Context, show: StagedShow) -> None:
+    def __init__(
+        self, context: moderngl.Context, show: StagedShow, size: tuple[int, int] = SIZE
+    ) -> None:
         self.now = 0.0
-        self.target = context.simple_framebuffer(SIZE, components=4)
+        self.target = context.simple_framebuffer(size, components=4)
         self.status = show._opened.status
         self.panel = Panel(context, show.controls, self._newest, clock=lambda: self.now)
 
@@ -80,6 +86,28 @@ def screen(context: moderngl.Context, show: StagedShow) -> Iterator[Screen]:
     screen.target.release()
 
 
+@pytest.fixture
+def small(context: moderngl.Context, show: StagedShow) -> Iterator[Screen]:
+    screen = Screen(context, show, SMALL)
+    yield screen
+    screen.panel.close()
+    screen.target.release()
+
+
+@pytest.fixture
+def words(monkeypatch: pytest.MonkeyPatch) -> set[str]:
+    """The words on the buttons that are drawn from now on."""
+    seen: set[str] = set()
+    draw = imgui.button
+
+    def button(label: str, *more: object) -> bool:
+        seen.add(label.partition("##")[0])
+        return bool(draw(label, *more))
+
+    monkeypatch.setattr(imgui, "button", button)
+    return seen
+
+
 def covered(picture: NDArray[np.uint8]) -> NDArray[np.bool_]:
     """The pixels that the panel covers or tints."""
     return np.abs(picture.astype(int) - 128).max(axis=2) > 2
@@ -115,6 +143,13 @@ def test_the_legend_of_many_characters_leaves_the_bar_free(
 def _top_of_bar(picture: NDArray[np.uint8]) -> int:
     """The first row [px] of the bar, where nothing else is."""
     return 300 + int(np.flatnonzero(covered(picture)[300:, 640]).min())
+
+
+def _rows_of_bar(picture: NDArray[np.uint8]) -> list[float]:
+    """The middle [px] of each row of buttons of the bar, the highest first."""
+    height, scale = len(picture), max(round(8.0 * len(picture) / 720.0) / 8.0, 0.5)
+    first, last = _top_of_bar(picture) + 27.0 * scale, height - (14.0 + 27.0) * scale
+    return [first + row * 36.0 * scale for row in range(1 + round((last - first) / (36.0 * scale)))]
 
 
 def test_a_hidden_panel_draws_nothing(screen: Screen, show: StagedShow) -> None:
@@ -156,13 +191,13 @@ def test_buttons_of_the_bar_do_their_actions_and_clicks_beside_it_pass(
 ) -> None:
     """A row of clicks along the bar presses each of its buttons that lights up, at least once."""
     screen.draw()
-    over = covered(screen.draw())
-    bar = int(np.flatnonzero(over[:, 640]).max()) - 24
     pressed: set[str] = set()
     lights = ("hold", "freeze", "blackout", "sliders", "help", "panel")
-    for x in range(20, 1262, 14):
+    rows = _rows_of_bar(screen.draw())
+    for x, y in [(x, y) for y in reversed(rows) for x in range(20, 1262, 14)]:
         before = {name: _lit(show.controls, name) for name in lights}
-        assert screen.click(x, bar)
+        kept = screen.click(x, y)
+        assert kept or y < rows[-1], "a bar may have fewer rows after a click"
         pressed |= {name for name in lights if _lit(show.controls, name) != before[name]}
         show.controls.view.help = show.controls.view.sliders = False
         show.controls.view.panel = True
@@ -184,7 +219,7 @@ def test_the_last_button_of_a_full_bar_stays_in_the_picture(
         performing=True,
     )
     screen.status = lambda: replace(status, characters=[sought, sought])
-    bar = _top_of_bar(screen.draw()) + 26
+    bar = _rows_of_bar(screen.draw())[-1]
     for x in range(1255, 1200, -6):
         screen.click(x, bar)
         if show.controls.view.help:
@@ -193,22 +228,37 @@ def test_the_last_button_of_a_full_bar_stays_in_the_picture(
 
 
 def test_a_button_says_at_once_what_it_does(screen: Screen) -> None:
-    picture = screen.draw()
-    bar = _top_of_bar(picture)
-    before = covered(picture)[:bar].copy()
-    screen.panel.gui.cursor(1236.0, bar + 26.0)
+    before = screen.draw()
+    screen.panel.gui.cursor(1236.0, _rows_of_bar(before)[-1])
     screen.draw(1)
     screen.now -= 0.19  # hardly any time later
-    assert (covered(screen.draw(1))[:bar] & ~before).sum() > 1000
+    changed = np.abs(screen.draw(1).astype(int) - before).max(axis=2) > 2
+    assert changed.sum() > 6000, "more than the button itself"
 
 
 @pytest.mark.parametrize("in_session", [True, False])
 def test_the_page_of_keys_has_every_key_once(in_session: bool) -> None:
-    columns = keys_page._columns(in_session=in_session)
-    shown = [key for groups in columns for _, rows in groups for key, _ in rows]
-    mouse = [key for key, _ in keys_page.MOUSE]
+    groups = keys_page._groups(in_session=in_session)
+    shown = [key for _, rows in groups for key, _, _ in rows]
+    mouse = [key for key, _, _ in keys_page.MOUSE]
     idle = set() if in_session else set(SESSION_ACTIONS) - {"loop"}
-    assert sorted(shown) == sorted([*(k for k, name in KEYS.items() if name not in idle), *mouse])
+    keys = [keys_page.SPELLED.get(key, key) for key, name in KEYS.items() if name not in idle]
+    assert sorted(shown) == sorted([*keys, *mouse])
+
+
+@pytest.mark.parametrize("size", [*SIZES, (640, 360)])
+def test_the_page_of_keys_is_laid_out_to_fit(screen: Screen, size: tuple[int, int]) -> None:
+    groups = keys_page._groups(in_session=True)
+    gui = screen.panel.gui
+    gui.begin(size, 0.1)
+    margin = 2.0 * 28.0 * gui.scale
+    layout = keys_page._fitting(groups, size[0] - margin, size[1] - margin - 40.0 * gui.scale)
+    imgui.end_frame()
+    assert layout.fits
+    assert layout.height <= size[1] - margin
+    assert len(layout.columns) * layout.column <= size[0]
+    assert [group for column in layout.columns for group in column] == groups
+    assert layout.texts is (size != SMALL), "no room for them there"
 
 
 def test_sliders_leave_the_bar_free(screen: Screen, show: StagedShow) -> None:
@@ -217,6 +267,72 @@ def test_sliders_leave_the_bar_free(screen: Screen, show: StagedShow) -> None:
     bar = _top_of_bar(screen.draw())
     assert over[100:400, 1100].all()
     assert not over[bar - 4 : bar].any()
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_no_card_lies_over_another(
+    context: moderngl.Context, show: StagedShow, size: tuple[int, int]
+) -> None:
+    show.controls.view.sliders = True
+    show.controls.notices.show("a line about what has just happened, as long as such lines are")
+    screen = Screen(context, show, size)
+    picture = screen.draw(8)
+    screen.panel.close()
+    screen.target.release()
+    assert picture.max(axis=2).min() > DOUBLE
+    over = covered(picture)
+    assert not over[:, :3].any()
+    assert not over[:, -3:].any()
+    assert show.scene is not None
+    left, right, top, bottom = show.scene.taken
+    width, height = size
+    down, across = slice(round(height * top), int(height * (1.0 - bottom)) - 1), round(width * left)
+    line = 60 * height // 720  # of what has just happened
+    stage = over[down, across : round(width * (1.0 - right))][line:]
+    assert stage.shape[0] > height // 3
+    assert not stage.any(), "nothing lies on what is framed"
+
+
+def test_what_has_happened_is_said_on_the_card_at_the_top(screen: Screen, show: StagedShow) -> None:
+    before = screen.draw(6)
+    show.controls.notices.show("the stage is dark now")
+    changed = np.abs(screen.draw(2).astype(int) - before).max(axis=2) > 2
+    rows = np.flatnonzero(changed.any(axis=1))
+    assert len(rows) > 0
+    assert rows.max() < 150
+
+
+def test_the_buttons_keep_their_names_in_a_small_window(
+    small: Screen, show: StagedShow, words: set[str]
+) -> None:
+    status = show._opened.status()
+    sought = replace(
+        status.characters[0], candidate=Candidate(1, 21, 0.8), matching=True, performing=True
+    )
+    small.status = lambda: replace(status, characters=[sought])
+    small.draw()
+    said = {each.split(" ", 1)[1] for each in words if " " in each}
+    wanted = {"Record", "Freeze", "Blackout", "Match again", "Sliders", "Full screen"}
+    assert said >= {*wanted, ACTIONS["accept"].label, ACTIONS["keep-match"].label}
+
+
+def test_every_button_of_a_bar_with_two_rows_can_be_pressed(
+    small: Screen, show: StagedShow
+) -> None:
+    rows = _rows_of_bar(small.draw())
+    assert len(rows) == 2
+    lights = ("freeze", "blackout", "sliders", "help", "panel", "audience")
+    pressed: set[str] = set()
+    for y in rows:
+        for x in range(20, 790, 14):
+            before = {name: _lit(show.controls, name) for name in lights}
+            small.click(x, y)
+            pressed |= {name for name in lights if _lit(show.controls, name) != before[name]}
+            show.controls.view.help = show.controls.view.sliders = False
+            show.controls.view.panel = True
+            show.controls.leaving = False
+            show.takes.stop()
+    assert pressed == set(lights)
 
 
 def _lit(controls: ShowControls, name: str) -> float:
