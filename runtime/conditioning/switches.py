@@ -52,6 +52,26 @@ class Conditioning:
         return now
 
 
+STEPS: Mapping[str, tuple[str, str]] = {
+    "order": (
+        "Leave out late frames",
+        "drop late and duplicate frames, and go on where a clock jumps",
+    ),
+    "identities": ("Tell people apart", "know somebody who comes back under a new number"),
+    "swaps": ("Put swapped limbs right", "correct limbs whose left and right are exchanged"),
+    "outliers": ("Leave out wild jumps", "ignore joints that jump and bones that stretch"),
+    "filter": ("Smooth trembling", "smooth every joint (One-Euro)"),
+    "predict": ("Make up for delay", "show where joints will be one frame later"),
+    "level": ("Level the floor", "keep the floor level"),
+    "mirror": ("Mirror left and right", "exchange left and right, as in a mirror"),
+    "scale": ("Same size for all", "make all performers the same size"),
+    "recalibrate": (
+        "Learn from a T pose",
+        "take a T or A pose kept still for a second as the rest pose",
+    ),
+}
+"""What people call each switch, and what it does: for panel, keys, remote and command line."""
+
 SWITCHES = tuple(field.name for field in fields(Conditioning))
 
 

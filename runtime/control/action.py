@@ -32,7 +32,8 @@ class Action:
         press: does it, as a button or a key does; None for a fader.
         write: sets its value in [0, 1]; None where there is no value to set.
         read: returns its value in [0, 1], for a light or a fader; None where there is none.
-        words: says what a press has done, where that is not its label with its state.
+        words: says what a press has done, where that is not its label with its state; nothing where
+            it says nothing.
     """
 
     label: str
@@ -55,12 +56,22 @@ def switch(
     text: str,
     read: Callable[[ShowControls], bool],
     write: Callable[[ShowControls, bool], None],
+    *,
+    done: tuple[str, str] | None = None,
 ) -> Action:
-    """Build an action that is on or off: a press reverses it, `write` sets it."""
+    """Build an action that is on or off: a press reverses it, `write` sets it.
+
+    Args:
+        label, text: as of `Action`.
+        read: returns whether it is on.
+        write: sets it.
+        done: what is said once a press has switched it on, and off; nothing where that is empty.
+    """
     return Action(
         label,
         text,
         press=lambda controls: write(controls, not read(controls)),
         write=lambda controls, value: write(controls, value >= 0.5),
         read=lambda controls: float(read(controls)),
+        words=None if done is None else lambda controls: done[0 if read(controls) else 1],
     )

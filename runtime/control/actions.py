@@ -8,25 +8,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from runtime.conditioning.switches import SWITCHES
+from runtime.conditioning.switches import STEPS, SWITCHES
 from runtime.control.action import Action, Kind, switch
 from runtime.control.session_actions import SESSION_ACTIONS
 from runtime.control.show_controls import ShowControls
 from runtime.control.sliders import SLIDERS, STEP, Slider
 from runtime.session.session_takes import record_into
-
-STEPS = {
-    "order": ("Leave out late frames", "dropping late and duplicate frames, on or off"),
-    "identities": ("Tell people apart", "steady identities, on or off"),
-    "swaps": ("Put swapped limbs right", "putting swapped limbs right, on or off"),
-    "outliers": ("Leave out wild jumps", "the gate for outliers, on or off"),
-    "filter": ("Smooth trembling", "smoothing, on or off"),
-    "predict": ("Make up for delay", "prediction, on or off"),
-    "level": ("Level the floor", "levelling the floor, on or off"),
-    "mirror": ("Mirror left and right", "exchanging left and right, on or off"),
-    "scale": ("Same size for all", "one size for all performers, on or off"),
-    "recalibrate": ("Learn from a T pose", "calibrating by a T or A pose kept still, on or off"),
-}
 
 
 def _slider_actions(name: str, slider: Slider) -> dict[str, Action]:
@@ -66,6 +53,7 @@ def _is_paused(controls: ShowControls) -> bool:
 
 def _pause(controls: ShowControls, on: bool) -> None:
     if controls.playback is None:
+        controls.notices.show("a live performer cannot be paused: e freezes the characters")
         return
     if controls.session is not None and controls.session.recording:
         _record(controls, False)
@@ -76,8 +64,21 @@ def _pause(controls: ShowControls, on: bool) -> None:
 
 
 def _home(controls: ShowControls) -> None:
-    if controls.playback is not None:
+    if controls.playback is None:
+        controls.notices.show("a live performer has no start to go back to")
+    else:
         controls.playback.seek(0.0)
+
+
+def _accept(controls: ShowControls) -> None:
+    if not controls.match_controls.matching:
+        controls.notices.show("no match is looked for: m looks for one")
+        return
+    controls.match_controls.accept()
+    if controls.match_controls.matching:
+        controls.notices.show("no pose has been seen yet: step into view")
+    else:
+        controls.notices.show("this match performs now")
 
 
 def _is_recording(controls: ShowControls) -> bool:
@@ -166,47 +167,65 @@ def _leave(controls: ShowControls) -> None:
 ACTIONS: Mapping[str, Action] = {
     "match-again": Action(
         "Match again",
-        "match again: strike a pose, the best match is shown",
+        "look for a match: strike a pose, and the best one lights up",
         press=lambda controls: controls.match_controls.match_again(),
         read=lambda controls: float(controls.match_controls.matching),
+        words=lambda _: "looking for a match: strike a pose",
     ),
     "accept": Action(
         "Use this match",
-        "accept the match shown; the pose is the rest state",
-        press=lambda controls: controls.match_controls.accept(),
+        "let what lights up perform; your pose now is its rest pose",
+        press=_accept,
     ),
     "next-match": Action(
-        "Next match", "the next match", press=lambda controls: controls.match_controls.next_match()
+        "Next match",
+        "light up the one after the match that is shown",
+        press=lambda controls: controls.match_controls.next_match(),
     ),
     "previous-match": Action(
         "Previous match",
-        "the match before",
+        "light up the one before the match that is shown",
         press=lambda controls: controls.match_controls.previous_match(),
     ),
     "rest-pose": Action(
         "Rest pose",
-        "the pose is the rest state",
+        "let your pose now stand for the character's rest pose",
         press=lambda controls: controls.match_controls.take_rest(),
+        words=lambda _: "this pose stands for the character's rest pose now",
     ),
     "calibrate": Action(
         "Calibrate",
-        "calibrate: the pose is the rest state, floor and sizes are measured anew",
+        "as Rest pose, and measure floor and sizes anew",
         press=lambda controls: controls.match_controls.calibrate(),
+        words=lambda _: "calibrated: this is the rest pose, floor and sizes are measured anew",
     ),
-    "hold": switch("Play / pause", "pause or resume playback (a recording)", _is_paused, _pause),
+    "hold": switch(
+        "Play / pause",
+        "let a recording stand still, or go on",
+        _is_paused,
+        _pause,
+        done=("paused", "playing"),
+    ),
     "play": Action(
         "Play",
-        "resume playback (a recording)",
+        "let a recording go on",
         press=lambda controls: _pause(controls, False),
         read=lambda controls: float(not _is_paused(controls)),
+        words=lambda _: "playing",
     ),
     "pause": Action(
         "Pause",
-        "pause playback (a recording)",
+        "let a recording stand still",
         press=lambda controls: _pause(controls, True),
         read=lambda controls: float(_is_paused(controls)),
+        words=lambda controls: "paused" if _is_paused(controls) else "",
     ),
-    "home": Action("To the start", "back to the start (a recording)", press=_home),
+    "home": Action(
+        "To the start",
+        "go back to the start of a recording",
+        press=_home,
+        words=lambda _: "back at the start",
+    ),
     "record": switch(
         "Record",
         "begin or end a take: the performer goes to a new file",
@@ -215,59 +234,87 @@ ACTIONS: Mapping[str, Action] = {
     ),
     "freeze": switch(
         "Freeze",
-        "freeze: characters stand still while the stream goes on",
+        "let the characters stand still while the performer goes on",
         lambda controls: controls.loop.frozen,
         _freeze,
+        done=("the characters stand still", "the characters move again"),
     ),
     "in-place": switch(
         "Stay in place",
-        "in place: characters stay where they are, or travel as their performers do",
+        "let characters stay where they are, or travel as their performers do",
         lambda controls: controls.selected[0].travel.in_place,
         _in_place,
+        done=("characters stay where they are", "characters travel as their performers do"),
     ),
     "blackout": switch(
         "Blackout",
-        "blackout: fade to black, and back",
+        "fade to black, and back",
         lambda controls: controls.scene is not None and controls.scene.blackout.target > 0.0,
         _blackout,
+        done=("the stage fades to black", "the light comes back"),
     ),
     "select": Action(
-        "Next character", "select the next character for the keys, or all", press=_select
+        "Next character", "let keys and sliders be for the next character, or all", press=_select
     ),
     "keep-match": Action(
         "Go on as before",
-        "stop matching: go on as before",
+        "look for no match any more",
         press=lambda controls: controls.match_controls.keep(),
+        words=lambda _: "going on as before",
     ),
-    "front": Action("Front", "look from the front again", press=_front),
-    "frame-all": Action("Frame all", "frame every character", press=_frame_all),
+    "front": Action(
+        "Front",
+        "look from the front again",
+        press=_front,
+        words=lambda _: "seen from the front",
+    ),
+    "frame-all": Action(
+        "Frame all",
+        "bring every character into the picture",
+        press=_frame_all,
+        words=lambda _: "every character is in the picture",
+    ),
     "chains": switch(
         "Show chains",
-        "show or hide the matched chains",
+        "light up the matched chains, or not",
         lambda controls: controls.scene is not None and controls.scene.highlights,
         _chains,
+        done=("the matched chains light up", "the matched chains are hidden"),
     ),
     "panel": switch(
-        "Panel", "show or hide the panel", lambda controls: controls.view.panel, _panel
+        "Panel",
+        "hide the panel, or show it again",
+        lambda controls: controls.view.panel,
+        _panel,
+        done=("", "the panel is hidden: Tab shows it again"),
     ),
     "sliders": switch(
         "Sliders",
-        "show or hide sliders and switches",
+        "show sliders and switches, or hide them",
         lambda controls: controls.view.sliders,
         _sliders,
+        done=("", ""),
     ),
-    "help": switch("Help", "show or hide all keys", lambda controls: controls.view.help, _help),
+    "help": switch(
+        "Keys",
+        "show all keys, or hide them",
+        lambda controls: controls.view.help,
+        _help,
+        done=("", ""),
+    ),
     "full-screen": switch(
         "Full screen",
         "fill the screen with the window, or not",
         lambda controls: controls.view.full_screen,
         _full_screen,
+        done=("F11 goes back from the full screen", ""),
     ),
     "audience": switch(
         "Audience",
-        "a second window with the show alone, on another screen if there is one, or not",
+        "open a second window with the show alone, on another screen if there is one, or close it",
         lambda controls: controls.view.audience,
         _audience,
+        done=("the audience's window opens", "the audience's window is closed"),
     ),
     **{
         name: action
@@ -276,7 +323,7 @@ ACTIONS: Mapping[str, Action] = {
     },
     **{name: _conditioning(name, *STEPS[name]) for name in SWITCHES},
     **SESSION_ACTIONS,
-    "leave": Action("Leave", "leave", press=_leave),
+    "leave": Action("Leave", "end the show", press=_leave, words=lambda _: "leaving"),
 }
 """Every action by its name. A new action is one more row, and a key in `runtime.control.keys`."""
 
@@ -289,8 +336,9 @@ def press(name: str, controls: ShowControls) -> None:
     before = controls.notices.latest
     action.press(controls)
     _perform_again(controls)
-    if controls.notices.latest is before:  # it has not spoken for itself
-        controls.notices.show(_done(action, controls))
+    said = _done(action, controls)
+    if said and controls.notices.latest is before:  # it has not spoken for itself
+        controls.notices.show(said)
 
 
 def set_value(name: str, value: float, controls: ShowControls) -> None:

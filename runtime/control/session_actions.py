@@ -60,8 +60,9 @@ def _loop(controls: ShowControls, on: bool) -> None:
 SESSION_ACTIONS: Mapping[str, Action] = {
     "rehearse": Action(
         "Rehearse",
-        "stop: the performer moves the characters again (a session)",
+        "let the performer move the characters again (a session)",
         press=_rehearse,
+        words=lambda _: "the performer moves the characters again",
     ),
     "retake": Action(
         "Retake", "take the newest take away and record it again (a session)", press=_retake
@@ -88,7 +89,7 @@ SESSION_ACTIONS: Mapping[str, Action] = {
     ),
     "loop": switch(
         "Loop",
-        "play again from the front at the end, or not",
+        "play again from the start at the end, or not",
         lambda controls: controls.playback is not None and controls.playback.loop,
         _loop,
     ),

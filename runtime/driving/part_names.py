@@ -19,14 +19,19 @@ ASIDE = 0.15  # of the skeleton's size from its middle, from which a part lies t
 def part_name(skeleton: Skeleton, plan: BodyPlan | None, chain: Chain) -> str:
     """Return what a chain is: "left arm", "right wing", else what the name of its last joint tells.
 
+    A chain that goes on beyond the part that it shares most joints with is called by that part.
+
     Numbered chains are counted, "tentacle 4 of 8, upper left"; one whose name tells nothing is
     called by its place, "limb, upper left".
     """
     tip = chain[-1]
-    for words, part in plan.in_words().items() if plan is not None else ():
+    parts = {} if plan is None else plan.in_words()
+    for words, part in parts.items():
         if tip in part[1:] or part == chain:
             return words
-    return _in_words(_Key(skeleton), tip)
+    shared = {words: len(set(part[1:]).intersection(chain[1:])) for words, part in parts.items()}
+    most = max(shared, key=shared.__getitem__, default="")
+    return most if shared.get(most) else _in_words(_Key(skeleton), tip)
 
 
 class _Key:

@@ -30,7 +30,6 @@ ICONS = {
     "panel": icons.ICON_FA_EYE_SLASH,
     "help": icons.ICON_FA_CIRCLE_QUESTION,
 }
-SHORT = {"help": "Keys", "panel": "Hide", "match-again": "Match again"}
 ICONS_ALONE = ("home", "previous-match", "next-match")
 OF_WINDOW = ("sliders", "audience", "full-screen", "panel", "help")
 QUIET = ("full-screen", "audience", "panel")
@@ -144,7 +143,7 @@ class _Bar:
             return ""
         if name == "hold":
             return "Play" if self._paused else "Pause"
-        return SHORT.get(name, ACTIONS[name].label)
+        return ACTIONS[name].label
 
     @property
     def _paused(self) -> bool:

@@ -24,7 +24,7 @@ def headline(status: ShowStatus) -> str:
     return {
         Sight.WAITING: f"Waiting for a performer, {_duration(sighting.seconds)}",
         Sight.NOT_UNDERSTOOD: "Something comes, but no performer",
-        Sight.SEEN: _in_view(status) if _is_live(status) else f"{status.origin} plays",
+        Sight.SEEN: _in_view(status) if _is_live(status) else f"{_name(status)} plays",
         Sight.LOST: f"Performer lost for {_duration(sighting.seconds)}",
         Sight.ENDED: "The end",
     }[sighting.sight]
@@ -33,7 +33,8 @@ def headline(status: ShowStatus) -> str:
 def details(status: ShowStatus) -> str:
     """Where the performer comes from, how many are in view, and what is seen of them."""
     sighting, live = status.sighting, _is_live(status)
-    words = [] if status.origin in headline(status) else [status.origin]
+    name = _name(status)
+    words = [] if name in headline(status) else [name]
     if sighting.sight is Sight.SEEN and status.performers:
         words.append(_people(status))
         words += [
@@ -104,6 +105,12 @@ def countdown(status: ShowStatus) -> float | None:
         if character.countdown is not None and math.isfinite(character.countdown)
     ]
     return min(left, default=None)
+
+
+def _name(status: ShowStatus) -> str:
+    """What the stream is called: an address as it is, of a path its last part."""
+    origin = status.origin
+    return origin if "://" in origin else origin.replace("\\", "/").rsplit("/", 1)[-1]
 
 
 def _is_live(status: ShowStatus) -> bool:

@@ -25,7 +25,7 @@ from runtime.cli.options.output_options import (
     file_settings,
     sender_settings,
 )
-from runtime.conditioning.switches import SWITCHES
+from runtime.conditioning.switches import STEPS, SWITCHES
 from runtime.render.background import NOTHING, Background
 from runtime.show.settings import (
     DRIVES,
@@ -36,19 +36,15 @@ from runtime.show.settings import (
     ShowSettings,
 )
 
-CONDITIONING = {
-    "order": "drop duplicate and late frames; continue where a clock jumps",
-    "identities": "recognise a performer who returns under a new number",
-    "swaps": "correct limbs whose left and right are exchanged",
-    "outliers": "ignore joints that jump and bones that stretch",
-    "filter": "smooth (One-Euro); off by default for recordings",
-    "predict": "show where joints will be one frame later; off by default",
-    "level": "keep the floor level; off by default for recordings",
-    "mirror": "exchange left and right, as in a mirror; off by default",
-    "scale": "make all performers the same size; off by default for recordings",
-    "recalibrate": "take a T or A pose that is kept still for a second as the rest state; off by "
-    "default",
+USUALLY = {
+    "filter": "; off by default for recordings",
+    "predict": "; off by default",
+    "level": "; off by default for recordings",
+    "mirror": "; off by default",
+    "scale": "; off by default for recordings",
+    "recalibrate": "; off by default",
 }
+"""When a switch of the conditioning is off, unless it is asked for."""
 
 
 def add_character_option(parser: argparse.ArgumentParser, *, required: bool) -> None:
@@ -235,8 +231,9 @@ def _add_remote(parser: argparse.ArgumentParser) -> None:
 
 def _add_conditioning(parser: argparse.ArgumentParser) -> None:
     stream = parser.add_argument_group("corrections of the performer's frames")
-    for name, text in CONDITIONING.items():
-        stream.add_argument(f"--{name}", action=argparse.BooleanOptionalAction, help=text)
+    for name, (label, text) in STEPS.items():
+        said = f"{label}: {text}{USUALLY.get(name, '')}"
+        stream.add_argument(f"--{name}", action=argparse.BooleanOptionalAction, help=said)
 
 
 def _add_driving(parser: argparse.ArgumentParser) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import argparse
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,7 +15,9 @@ from devices.stream import open_stream
 from replay.formats import read_recording
 from replay.player import EveryFrame, Player
 from runtime.characters.character import Character
-from runtime.conditioning.switches import SWITCHES
+from runtime.cli.options.show_options import add_show_options
+from runtime.conditioning.switches import STEPS, SWITCHES
+from runtime.control import actions
 from runtime.control.actions import ACTIONS
 from runtime.control.keys import KEYS
 from runtime.control.session_actions import SESSION_ACTIONS
@@ -91,9 +95,50 @@ def test_the_documented_table_is_the_table() -> None:
     for name, action in ACTIONS.items():
         tells = "yes" if action.read else ""
         table.append(
-            [f"`/bunraku/{name}`", keys.get(name, ""), action.text, action.kind.value, tells]
+            [
+                f"`/bunraku/{name}`",
+                keys.get(name, ""),
+                action.label,
+                action.text,
+                action.kind.value,
+                tells,
+            ]
         )
     assert rows == table
+
+
+def test_every_step_of_the_conditioning_has_one_name() -> None:
+    page = (Path(__file__).resolve().parents[3] / "docs" / "streams.md").read_text("utf-8")
+    named = re.findall(r"^\| ([^|]+) \| [^|]+ \| `--(\w+)`", page, re.MULTILINE)
+    assert {name: label for label, name in named} == {
+        name: label for name, (label, _) in STEPS.items()
+    }
+    parser = argparse.ArgumentParser(prog="x")
+    add_show_options(parser)
+    usage = " ".join(parser.format_help().split())
+    for name, (label, text) in STEPS.items():
+        assert ACTIONS[name].label == label
+        assert f"{label}: {text}" in usage
+    assert set(STEPS) == set(SWITCHES)
+
+
+@pytest.mark.parametrize(
+    ("name", "on", "off"),
+    [
+        ("freeze", "the characters stand still", "the characters move again"),
+        ("blackout", "the stage fades to black", "the light comes back"),
+        ("help", "", ""),
+        ("panel", "the panel is hidden: Tab shows it again", ""),
+        ("mirror", "Mirror left and right: on", "Mirror left and right: off"),
+        ("accept", "no pose has been seen yet: step into view", ""),
+        ("hold", "paused", "playing"),
+    ],
+)
+def test_what_a_press_has_done_is_said(show: StagedShow, name: str, on: str, off: str) -> None:
+    for said in (on, off) if off or not on else (on,):
+        show.now += 60.0
+        actions.press(name, show.controls)
+        assert [notice.text for notice in show.controls.notices.current] == [said] * bool(said)
 
 
 def test_a_match_is_accepted_and_looked_for_again(show: StagedShow) -> None:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from devices.bodies.body_plan import BodyPlan, Limb
+from devices.bodies.joint_names import Side
 from devices.skeleton import Skeleton
 from runtime.driving.part_names import part_name
 
@@ -45,3 +47,11 @@ SQUID = Skeleton(NAMES, np.array([-1, 0, 1, 0, 0, 0, 0, 0]), np.array(PLACES, dt
 )
 def test_a_part_without_a_plan_is_counted_or_called_by_its_place(tip: str, words: str) -> None:
     assert part_name(SQUID, None, (0, NAMES.index(tip))) == words
+
+
+def test_a_chain_that_goes_on_beyond_a_limb_is_called_by_that_limb() -> None:
+    names = ("hips", "RightArm", "RightHand", "RFingers_end", "Horn_end")
+    body = Skeleton(names, np.array([-1, 0, 1, 2, 0]), np.zeros((5, 3)))
+    plan = BodyPlan((0,), arms={Side.RIGHT: Limb((1, 2))})
+    assert part_name(body, plan, (1, 2, 3)) == "right arm"
+    assert part_name(body, plan, (0, 4)) == "Horn_end"

@@ -52,6 +52,9 @@ def test_a_recording_that_plays_is_named_and_asks_nobody_to_perform() -> None:
     assert headline(plays) == "dab.bvh plays"
     assert "Perform" not in advice(plays)
     assert "Perform" in advice(LIVE)
+    by_path = replace(plays, origin="/home/somebody/motions/dab.bvh")
+    assert headline(by_path) == "dab.bvh plays"
+    assert "home" not in details(by_path)
     matched = replace(plays, characters=[replace(SQUID, matching=True)])
     assert headline(matched) == "Looking for a match"
     assert "dab.bvh" in details(matched)
