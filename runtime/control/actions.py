@@ -70,12 +70,16 @@ def _home(controls: ShowControls) -> None:
         controls.playback.seek(0.0)
 
 
+def _is_matching(controls: ShowControls) -> bool:
+    return controls.match_controls.matching
+
+
 def _accept(controls: ShowControls) -> None:
-    if not controls.match_controls.matching:
+    if not _is_matching(controls):
         controls.notices.show("no match is looked for: m looks for one")
         return
     controls.match_controls.accept()
-    if controls.match_controls.matching:
+    if _is_matching(controls):
         controls.notices.show("no pose has been seen yet: step into view")
     else:
         controls.notices.show("this match performs now")
@@ -169,7 +173,7 @@ ACTIONS: Mapping[str, Action] = {
         "Match again",
         "look for a match: strike a pose, and the best one lights up",
         press=lambda controls: controls.match_controls.match_again(),
-        read=lambda controls: float(controls.match_controls.matching),
+        read=lambda controls: float(_is_matching(controls)),
         words=lambda _: "looking for a match: strike a pose",
     ),
     "accept": Action(
