@@ -83,6 +83,16 @@ def _drive(pair: dict[str, Any], source: Skeleton, target: Skeleton) -> Drive:
         target=tuple(_node(node, target) for node in _listed(pair, "target")),
         flip=flip,
     )
+    check_drive(drive, target)
+    return drive
+
+
+def check_drive(drive: Drive, target: Skeleton) -> None:
+    """Check that both polylines of a drive are such, and that the character has the target's bones.
+
+    Raises:
+        InputError: they are too short or meet a joint twice, or nodes share no bone.
+    """
     for end, chain in (("source", drive.source), ("target", drive.target)):
         if len(chain) < 2 or len(set(chain)) != len(chain):
             raise InputError(f"each {end} polyline needs two or more different joints")
@@ -91,7 +101,6 @@ def _drive(pair: dict[str, Any], source: Skeleton, target: Skeleton) -> Drive:
             raise InputError(
                 f"target nodes {target.names[near]} and {target.names[far]} share no bone"
             )
-    return drive
 
 
 def _listed(holder: dict[str, Any], key: str) -> list[Any]:

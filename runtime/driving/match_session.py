@@ -17,7 +17,8 @@ from runtime.driving.choices import Choices
 from runtime.driving.driver import DrivenPart
 from runtime.driving.drivers import DriverFactory
 from runtime.driving.mapping import Mapping
-from runtime.driving.matching.puppet_match import PuppetMatch, PuppetMatchState
+from runtime.driving.matching.puppet_match import PuppetMatch
+from runtime.driving.matching.puppet_match_state import PuppetMatchState
 from runtime.driving.performer import Performer, Pose, Rest, rest_state
 from runtime.driving.polyline_driver import PolylineDriver
 from runtime.driving.reach import Reach

@@ -172,6 +172,11 @@ class Performer:
         self._heading, self.pose = state.heading, state.pose
 
     @property
+    def mirrors(self) -> bool:
+        """Whether left and right are exchanged."""
+        return self._conditioner.switches.mirror
+
+    @property
     def calibrates(self) -> bool:
         """Whether the newest pose is a T or A pose that was kept still, to be the rest state."""
         return self._conditioner.calibrates

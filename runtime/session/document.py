@@ -13,6 +13,7 @@ from typing import TypeVar
 
 from devices.errors import InputError
 from runtime.session.performance import Performance
+from runtime.session.setup import Setup
 
 SHORTEST = 1e-3  # [s] of a clip
 LONGEST = 1e6  # [s] of a session
@@ -32,6 +33,7 @@ class Actor:
         character: a built-in character, or the file in the session.
         drive: the `--drive` that its takes were made with, which decides on its nodes.
         nodes: how many nodes it has.
+        setup: how it was driven last; None where that is not known.
     """
 
     id: int
@@ -39,6 +41,7 @@ class Actor:
     character: str
     drive: str
     nodes: int
+    setup: Setup | None = None
 
 
 @dataclass(frozen=True, slots=True)

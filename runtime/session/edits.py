@@ -17,11 +17,20 @@ from runtime.session.document import (
     Take,
     next_id,
 )
+from runtime.session.setup import Setup
 
 
 def with_actor(session: Session, actor: Actor) -> Session:
     """Add an actor."""
     return replace(session, actors=(*session.actors, actor))
+
+
+def set_up(session: Session, number: int, setup: Setup) -> Session:
+    """Give an actor another setup."""
+    actors = (
+        replace(actor, setup=setup) if actor.id == number else actor for actor in session.actors
+    )
+    return replace(session, actors=tuple(actors))
 
 
 def with_take(session: Session, take: Take, start: float, *, speed: float = 1.0) -> Session:

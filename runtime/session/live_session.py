@@ -15,6 +15,7 @@ from runtime.session.document import Session, Take, next_id
 from runtime.session.files import unfinished
 from runtime.session.files.store import SessionStore
 from runtime.session.kiosk import Kiosk
+from runtime.session.live_setups import LiveSetups
 from runtime.session.performance import Performance
 from runtime.session.transport import Mode, Transport
 
@@ -46,6 +47,7 @@ class LiveSession:
     Args:
         store: where it is kept.
         staged: the characters, in the order of the session's actors.
+        setups: of the actors.
         armed: whether the performer of a puppet is recorded, and moves it.
         tell: takes one line when something has happened.
         warn: takes one line on a fault.
@@ -60,6 +62,7 @@ class LiveSession:
         self,
         store: SessionStore,
         staged: Sequence[StagedActor],
+        setups: LiveSetups,
         armed: Callable[[Puppet], bool],
         *,
         tell: Callable[[str], None],
@@ -68,7 +71,7 @@ class LiveSession:
         self.store = store
         self.transport = Transport(lambda: self.session.duration)
         self.kiosk: Kiosk | None = None
-        self._staged, self._armed = staged, armed
+        self._staged, self._setups, self._armed = staged, setups, armed
         self._tell, self._warn = tell, warn
         self._time = float("nan")
         self._start = 0.0
@@ -107,16 +110,25 @@ class LiveSession:
         self.store.versions.drop()
         self._write()
 
+    def note_setups(self) -> None:
+        """Note how the actors are driven, where that has changed, as a step that can be undone."""
+        if self.kiosk is None and self._setups.note():
+            self._write()
+
     def undo(self) -> None:
         """Go back by one step, and say what was undone."""
+        self.note_setups()
         done = self.store.versions.undone
         self._tell(f"undone: {done}" if self.store.versions.undo() else "nothing to undo")
+        self._setups.bring_back()
         self._write()
 
     def redo(self) -> None:
         """Do again what was undone last."""
+        self.note_setups()
         done = self.store.versions.redone
         self._tell(f"done again: {done}" if self.store.versions.redo() else "nothing to do again")
+        self._setups.bring_back()
         self._write()
 
     def say(self, line: str) -> None:

@@ -12,6 +12,7 @@ from runtime.session.document import Actor, Session
 from runtime.session.edits import with_actor
 from runtime.session.files.store import SessionStore
 from runtime.session.live_session import LiveSession, StagedActor
+from runtime.session.live_setups import ActorSetup, LiveSetups
 from runtime.session.versions import Versions
 from runtime.show.act_group import Act, ActGroup
 
@@ -22,16 +23,20 @@ def open_session(
     matching: ActGroup,
     drive: str,
     *,
+    clock: Callable[[], float],
     tell: Callable[[str], None],
     warn: Callable[[str], None],
 ) -> LiveSession:
     """Connect a session with a show; a new session gets the show's characters as its actors.
+
+    Actors that were set up before are so again.
 
     Args:
         store: where the session is kept.
         acts: each performer with their puppets.
         matching: knows which characters are selected; those are recorded.
         drive: how the characters are driven, which decides on their nodes.
+        clock: host monotonic time [s].
         tell: takes one line of what happened.
         warn: takes one line about a fault.
 
@@ -45,12 +50,11 @@ def open_session(
         for number, (puppet, name) in enumerate(zip(puppets, names, strict=True), 1):
             session = with_actor(session, _actor(number, puppet, name, drive))
         store.versions = Versions(session)
-        store.write()
     _check_actors(store.path, session, puppets, drive)
     for note in store.notes:
         warn(note)
-    staged = [
-        _staged(actor.id, act, puppet, match)
+    driven = [
+        (actor.id, act, puppet, match)
         for actor, (act, puppet, match) in zip(
             session.actors,
             [
@@ -61,8 +65,21 @@ def open_session(
             strict=True,
         )
     ]
+    setups = LiveSetups(
+        store,
+        [ActorSetup(actor, act.performer, puppet, match) for actor, act, puppet, match in driven],
+        clock=clock,
+        warn=warn,
+    )
+    store.versions = Versions(setups.begin())
+    store.write()
     return LiveSession(
-        store, staged, lambda puppet: puppet in matching.puppets, tell=tell, warn=warn
+        store,
+        [_staged(*one) for one in driven],
+        setups,
+        lambda puppet: puppet in matching.puppets,
+        tell=tell,
+        warn=warn,
     )
 
 

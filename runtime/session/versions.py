@@ -60,8 +60,9 @@ class Versions:
         if self._dragged == done and self._at > 0:
             self._steps[self._at] = Step(session, done)
             return
-        self.do(session, done)
-        self._dragged = done
+        if session != self.session:
+            self.do(session, done)
+            self._dragged = done
 
     def drop(self) -> None:
         """End a drag: the next one is another step."""

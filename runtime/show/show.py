@@ -139,6 +139,8 @@ class Show:
             self._opened.window_controls.serve()
         if self._opened.remote is not None:
             self._opened.remote.serve(self.controls)
+        if self.controls.session is not None:
+            self.controls.session.note_setups()
         return performed
 
     def settle(self) -> None:

@@ -18,6 +18,7 @@ from runtime.session.files.archive import unpack
 from runtime.session.files.folder import DOCUMENT
 from runtime.session.files.performance_file import read_performance, save_performance
 from runtime.session.performance import Performance
+from runtime.session.setup import Pair, Setup, StruckMatch
 
 Sample = tuple[str, bytes, Callable[[Path], None]]
 
@@ -35,7 +36,11 @@ def session_samples(folder: Path) -> list[Sample]:
         shifts=np.full((3, 2, 3), 0.1, np.float32),
         placements=np.full((3, 5), 0.5, np.float32),
     )
-    actor = Actor(1, "squid", "squid", "auto", 2)
+    pair = Pair(("hip", "knee"), (0, 1))
+    match = StruckMatch(
+        ("hip", "knee"), ((0.0, 1.0, 0.0), (0.0, 0.5, 0.0)), 0.0, 1.0, pairs=(pair,)
+    )
+    actor = Actor(1, "squid", "squid", "auto", 2, Setup(match))
     take = Take(1, "take 1", 1, performance, "take-1.mcap", ("arm -> arm, absolute, 100 %",))
     clip = Clip(1, 1, 0.0, 0.0, performance.duration)
     session = Session((actor,), (take,), (clip,), (Mark(0.5, "here"),), (0.0, 1.0))

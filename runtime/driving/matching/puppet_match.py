@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,39 +17,20 @@ from runtime.driving.mapping import Mapping
 from runtime.driving.matching.hand_mapping import mapping_of_hands
 from runtime.driving.matching.mapping_choice import MappingChoice
 from runtime.driving.matching.match_guard import MatchGuard
+from runtime.driving.matching.match_setup import MatchSetup
+from runtime.driving.matching.puppet_match_state import PuppetMatchState
 from runtime.driving.pairing import Pairing
 from runtime.driving.performer import Performer, Pose, Rest
+from runtime.driving.polyline_driver import STRAIGHT_ON
 from runtime.driving.reach import Reach, reach_of
 from runtime.driving.turn_limits import box_of, corners_of, limit_turns
 from runtime.puppet.puppet import Puppet
-from solvers.retarget.match_hysteresis import MatchHysteresis, MatchHysteresisState
+from solvers.retarget.match_hysteresis import MatchHysteresis
 from solvers.retarget.source_limbs import SimplifiedSource
 
 OF_ANATOMY = 1.0  # [s] at most that a performer is seen before the anatomy's choice performs
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class PuppetMatchState:
-    """The state of a `PuppetMatch` between two frames; the driver's belongs to the puppet.
-
-    Attributes:
-        rest: the performer's rest state.
-        hysteresis: of the match shown.
-        matching: whether a match is looked for.
-        matched: whether matches were stepped to in place of the anatomy's choice.
-        drives_matched: whether the driver that moves the puppet came of that.
-        proposal: the state of the driver that is proposed in place of the one that moves the
-            puppet; None where none is.
-    """
-
-    rest: Rest | None
-    hysteresis: MatchHysteresisState
-    matching: bool
-    matched: bool
-    drives_matched: bool
-    proposal: object | None
 
 
 class PuppetMatch:
@@ -92,6 +73,7 @@ class PuppetMatch:
         self._matched = self._drives_matched = False
         self._of_hands = mapping_of_hands(self._pairing()) if make_driver is best_driver else None
         self.matching = True
+        self._view = STRAIGHT_ON
         self._driver = self._make(make_driver)
         guarded = make_driver is best_driver and isinstance(self._driver, MappedDriver)
         self._anatomy = MatchGuard(performer, source, puppet) if guarded else None
@@ -102,11 +84,11 @@ class PuppetMatch:
         """Return what is remembered between frames."""
         proposal = None if self._proposal is None else self._proposal.snapshot()
         shown, matched = self._hysteresis.snapshot(), (self._matched, self._drives_matched)
-        return PuppetMatchState(self.rest, shown, self.matching, *matched, proposal)
+        return PuppetMatchState(self.rest, self._view, shown, self.matching, *matched, proposal)
 
     def restore(self, state: PuppetMatchState) -> None:
         """Go back to a snapshot; the puppet's own brings the driver back."""
-        self.rest, self.matching = state.rest, state.matching
+        self.rest, self._view, self.matching = state.rest, state.view, state.matching
         self._hysteresis.restore(state.hysteresis)
         if self._drives_matched is not state.drives_matched:
             self._matched = state.drives_matched
@@ -206,7 +188,7 @@ class PuppetMatch:
         if shown is not self._driver:
             self._drive_with(shown)
             self._propose(None)
-        self.rest, self.matching = rest, False
+        self.rest, self.matching, self._view = rest, False, view
 
     def restate(self, rest: Rest, view: Array) -> None:
         """Go on from another rest state for the same mapping, with the same turn limits.
@@ -222,7 +204,35 @@ class PuppetMatch:
         else:
             driver.prepare(self._clip, rest)
         self.puppet.ease()
-        self.rest = rest
+        self.rest, self._view = rest, view
+
+    @property
+    def setup(self) -> MatchSetup:
+        """What drives the puppet now, whatever is proposed."""
+        driver = self._driver
+        mapping, gains = Mapping(()), np.ones(0)
+        if isinstance(driver, MappedDriver) and self.rest is not None:
+            mapping, gains = driver.mapping, driver.gains
+        return MatchSetup(
+            self.rest, mapping, self._view, self._drives_matched, tuple(gains.tolist())
+        )
+
+    def set_up(self, setup: MatchSetup) -> None:
+        """Drive the puppet as it was driven with an earlier setup; what is proposed is dropped.
+
+        Raises:
+            InputError: the setup does not fit the puppet, which goes on as it is driven now.
+        """
+        before, self._matched = self._matched, setup.matched
+        driver = self._make(self._make_driver)
+        try:
+            self._prepare(driver, setup)
+        except InputError:
+            self._matched = before
+            raise
+        self._propose(None)
+        self._drive_with(driver)
+        self.rest, self.matching, self._view = setup.rest, setup.rest is None, setup.view
 
     def rehearse(self, clip: Sequence[Pose], states: Sequence[Rest], view: Array) -> None:
         """Let the puppet perform from that one of these rest states which is most like it.
@@ -320,21 +330,23 @@ class PuppetMatch:
         Raises:
             InputError: the new driver cannot drive this puppet; the old one goes on.
         """
-        before, driver = self._driver, self._make(make_driver)
+        driver = self._make(make_driver)
         self.keep()
-        if isinstance(driver, MappedDriver):
-            mapping = self.mapping
-            if self.rest is not None and not mapping.drives:
-                mapping = self._mapping_choice.of_pose(
-                    self._hysteresis, self.rest.positions, 0.0, view
-                )
-            driver.show(mapping, view)
-        driver.prepare(self._clip, self.rest)
-        if isinstance(driver, MappedDriver) and isinstance(before, MappedDriver):
-            driver.gains = before.gains
-        self.puppet.ease()
-        self._make_usual, self._matched = make_driver, False
+        mapping = self.mapping
+        if isinstance(driver, MappedDriver) and self.rest is not None and not mapping.drives:
+            mapping = self._mapping_choice.of_pose(self._hysteresis, self.rest.positions, 0.0, view)
+        self._prepare(driver, replace(self.setup, mapping=mapping, view=view))
+        self._make_usual, self._matched, self._view = make_driver, False, view
         self._drive_with(driver)
+
+    def _prepare(self, driver: Driver, setup: MatchSetup) -> None:
+        """Make a driver ready to move the puppet, which will ease over to it."""
+        if isinstance(driver, MappedDriver):
+            driver.show(setup.mapping, setup.view)
+        driver.prepare(self._clip, setup.rest)
+        if isinstance(driver, MappedDriver) and setup.gains:
+            driver.gains = np.array(setup.gains)
+        self.puppet.ease()
 
     @property
     def _of_anatomy(self) -> Mapping | None:

@@ -287,7 +287,9 @@ class OpenedShow:
         if self._store is None:
             return None
         drive, tell, warn = self._settings.match.driver, self._tell, self._warn
-        session = open_session(self._store, self.acts, matching, drive, tell=tell, warn=warn)
+        session = open_session(
+            self._store, self.acts, matching, drive, clock=self._clock, tell=tell, warn=warn
+        )
         self.loop.goes_on = lambda: session.goes_on
         if self._settings.kiosk is not None:
             session.kiosk = Kiosk(session.transport, self._settings.kiosk)

@@ -1,0 +1,37 @@
+"""The state of the match of one puppet between two frames."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from runtime.driving.performer import Rest
+from solvers.retarget.match_hysteresis import MatchHysteresisState
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PuppetMatchState:
+    """The state of a `PuppetMatch` between two frames; the driver's belongs to the puppet.
+
+    Attributes:
+        rest: the performer's rest state.
+        view: (3, 3) rotation from the stage to the camera when it was taken.
+        hysteresis: of the match shown.
+        matching: whether a match is looked for.
+        matched: whether matches were stepped to in place of the anatomy's choice.
+        drives_matched: whether the driver that moves the puppet came of that.
+        proposal: the state of the driver that is proposed in place of the one that moves the
+            puppet; None where none is.
+    """
+
+    rest: Rest | None
+    view: Array
+    hysteresis: MatchHysteresisState
+    matching: bool
+    matched: bool
+    drives_matched: bool
+    proposal: object | None
