@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
-import re
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -15,11 +13,9 @@ from devices.stream import open_stream
 from replay.formats import read_recording
 from replay.player import EveryFrame, Player
 from runtime.characters.character import Character
-from runtime.cli.options.show_options import add_show_options
-from runtime.conditioning.switches import STEPS, SWITCHES
+from runtime.conditioning.switches import SWITCHES
 from runtime.control import actions
 from runtime.control.actions import ACTIONS
-from runtime.control.keys import KEYS
 from runtime.control.session_actions import SESSION_ACTIONS
 from runtime.control.sliders import SLIDERS
 from runtime.puppet.deformable_surface import Elasticity
@@ -81,45 +77,6 @@ def test_every_action_is_tried_here() -> None:
         assert action.text
         assert action.press or action.write
         assert action.read or not action.write, "what can be set can be shown"
-
-
-def test_the_documented_table_is_the_table() -> None:
-    page = (Path(__file__).resolve().parents[3] / "docs" / "remote.md").read_text("utf-8")
-    rows = [
-        [cell.strip() for cell in line.strip("|").split("|")]
-        for line in page.splitlines()
-        if line.startswith("| `/bunraku/")
-    ]
-    keys = {name: f"`{key}`" for key, name in KEYS.items()}
-    table = []
-    for name, action in ACTIONS.items():
-        tells = "yes" if action.read else ""
-        table.append(
-            [
-                f"`/bunraku/{name}`",
-                keys.get(name, ""),
-                action.label,
-                action.text,
-                action.kind.value,
-                tells,
-            ]
-        )
-    assert rows == table
-
-
-def test_every_step_of_the_conditioning_has_one_name() -> None:
-    page = (Path(__file__).resolve().parents[3] / "docs" / "streams.md").read_text("utf-8")
-    named = re.findall(r"^\| ([^|]+) \| [^|]+ \| `--(\w+)`", page, re.MULTILINE)
-    assert {name: label for label, name in named} == {
-        name: label for name, (label, _) in STEPS.items()
-    }
-    parser = argparse.ArgumentParser(prog="x")
-    add_show_options(parser)
-    usage = " ".join(parser.format_help().split())
-    for name, (label, text) in STEPS.items():
-        assert ACTIONS[name].label == label
-        assert f"{label}: {text}" in usage
-    assert set(STEPS) == set(SWITCHES)
 
 
 @pytest.mark.parametrize(

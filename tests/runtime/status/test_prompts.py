@@ -52,7 +52,7 @@ def test_a_recording_that_plays_is_named_and_asks_nobody_to_perform() -> None:
     assert headline(plays) == "dab.bvh plays"
     assert "Perform" not in advice(plays)
     assert "Perform" in advice(LIVE)
-    by_path = replace(plays, origin="/home/somebody/motions/dab.bvh")
+    by_path = replace(plays, origin="/shows/motions/dab.bvh")
     assert headline(by_path) == "dab.bvh plays"
     assert "home" not in details(by_path)
     matched = replace(plays, characters=[replace(SQUID, matching=True)])
