@@ -102,7 +102,8 @@ def open_outputs(
         own: list[Output] = [part]
         if files.export is not None:
             path = _of(files.export, name, names)
-            own.append(kept(path, open_export(path, character, rate=rate), at_the_end=True))
+            export = open_export(path, character, rate=rate, within=files.export_within)
+            own.append(kept(path, export, at_the_end=True))
         if files.cache is not None:
             path = _of(files.cache, name, names)
             own.append(kept(path, PointCache(path, character)))

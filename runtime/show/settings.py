@@ -117,6 +117,8 @@ class FileSettings:
         report: figures of the show as JSON.
         record: the performer's frames as MCAP, from the first frame on.
         export: the performed character as .glb, .usdc, .usda or .bvh.
+        export_within: how far the surface of a .glb, or a joint of a .bvh, may be from where it
+            was performed, as a share of the height; None for a skin alone, or rigid bones.
         takes: recordings that are started while the show runs are called ``NAME-1.mcap`` and so on
             beside this one; None: beside `record`, or ``take.mcap`` in the current folder.
 
@@ -130,6 +132,7 @@ class FileSettings:
     report: Path | None = None
     record: Path | None = None
     export: Path | None = None
+    export_within: float | None = None
     takes: Path | None = None
 
     def __post_init__(self) -> None:

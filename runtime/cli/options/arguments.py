@@ -106,6 +106,11 @@ def share(text: str) -> float:
     return _between(text, 0.0, 1.0)
 
 
+def share_or_rigid(text: str) -> float | None:
+    """A number from 1e-6 to 1, or "rigid" for None."""
+    return None if text == "rigid" else _between(text, 1e-6, 1.0)
+
+
 def stiffness(text: str) -> float:
     """A number from 0 to 0.99."""
     return _between(text, 0.0, MOST_STIFFNESS)

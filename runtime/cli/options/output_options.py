@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from runtime.cli.options.arguments import Once, host_port, positive
+from runtime.cli.options.arguments import Once, host_port, positive, share_or_rigid
 from runtime.show.settings import FileSettings, SenderSettings
 
 
@@ -18,6 +18,7 @@ def file_settings(options: argparse.Namespace) -> FileSettings:
         report=options.report,
         record=options.record,
         export=options.export,
+        export_within=options.export_within,
     )
 
 
@@ -33,8 +34,15 @@ def sender_settings(options: argparse.Namespace) -> SenderSettings:
     )
 
 
-def add_file_options(parser: argparse.ArgumentParser) -> None:
-    """Add the options that write files."""
+def add_file_options(
+    parser: argparse.ArgumentParser, *, export_within: float | None = None
+) -> None:
+    """Add the options that write files.
+
+    Args:
+        parser: of the command.
+        export_within: default of the option with this name.
+    """
     keep = parser.add_argument_group("files to write")
     keep.add_argument(
         "--video",
@@ -78,6 +86,16 @@ def add_file_options(parser: argparse.ArgumentParser) -> None:
         type=Path,
         metavar="OUT.{glb,usdc,usda,bvh}",
         help="the performed character, for other programs",
+    )
+    keep.add_argument(
+        "--export-within",
+        type=share_or_rigid,
+        default=export_within,
+        metavar="SHARE",
+        help="how far the surface of a .glb or a joint of a .bvh may be from where it was "
+        "performed, as a share of the height, such as 1e-4: morph targets correct the skin, and "
+        "joints slide; or `rigid`: a skin alone, and rigid bones "
+        f"(default: {'rigid' if export_within is None else export_within})",
     )
 
 

@@ -10,6 +10,7 @@ from runtime.cli.options.arguments import positive
 from runtime.cli.options.output_options import add_file_options, file_settings
 from runtime.cli.options.show_options import add_picture_options, background_of
 
+EXACT = 1e-4  # of a character's height
 HELP = "write a session's video, pictures and characters"
 
 
@@ -27,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--rate", type=positive, default=60.0, metavar="HZ", help="frames a second (default 60)"
     )
     add_picture_options(parser)
-    add_file_options(parser)
+    add_file_options(parser, export_within=EXACT)
 
 
 def run(options: argparse.Namespace) -> int:

@@ -59,6 +59,32 @@ class GlbBuilder:
         accessor["bufferView"] = self._add_view(stored.tobytes(), target)
         return self._add("accessors", accessor)
 
+    def add_places(self, places: NDArray[np.uint32]) -> int:
+        """Store places in arrays for `add_sparse`, and return the index of their view."""
+        return self._add_view(places.tobytes(), None)
+
+    def add_sparse(self, values: NDArray[np.float32], places: int, count: int) -> int:
+        """Store an array that is 0 but for some rows, with its bounds; the index of its accessor.
+
+        Args:
+            values: (n, c) the rows.
+            places: the view that says where they are.
+            count: how many rows there are with those that are 0.
+        """
+        accessor = {
+            "componentType": _COMPONENTS["float32"],
+            "count": count,
+            "type": _SHAPES[values.shape[1:]],
+            "min": np.minimum(values.min(axis=0), 0.0).tolist(),
+            "max": np.maximum(values.max(axis=0), 0.0).tolist(),
+            "sparse": {
+                "count": len(values),
+                "indices": {"bufferView": places, "componentType": _COMPONENTS["uint32"]},
+                "values": {"bufferView": self._add_view(values.tobytes(), None)},
+            },
+        }
+        return self._add("accessors", accessor)
+
     def add_texture(self, pixels: NDArray[np.uint8]) -> int:
         """Store an image (h, w, 4) as PNG, and return the index of its texture."""
         png = io.BytesIO()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
@@ -9,10 +10,13 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from devices.errors import InputError
 from runtime.characters.character import Character, Material, Surface
 from runtime.output.files.glb import ARRAY_BUFFER, ELEMENT_ARRAY_BUFFER, GlbBuilder
-from runtime.output.files.morph_export import MorphExport
+from runtime.output.files.kept_file import counting, millimetres
+from runtime.output.files.morph_export import MorphExport, MovedShapes
 from runtime.output.files.node_motion import NodeMotion, NodeMotionRecorder
+from runtime.output.files.surface_correction import Correction, SurfaceFile, correct
 from runtime.output.files.whole_file import check_suffix, check_writable
 from runtime.output.output import PerformedFrame
 from solvers.surface.skin_weights import (
@@ -27,15 +31,16 @@ from solvers.surface.skin_weights import (
 
 _SAMPLES = 64  # most frames that the skin is fitted to
 _STILL = 1e-6  # of the character's size: smaller motion needs no channel
+_FINEST = 1e-6  # of the character's size: files hold numbers of 24 bits
 _ROUGHNESS = 0.8  # cloth and paint, like the puppets on our own stage
 
 
 @dataclass(frozen=True, slots=True)
 class SkinDeviation:
-    """Distance between the skinned surface and the performed one.
+    """Distance between the surface of the file and the performed one.
 
     Attributes:
-        rms: root mean square over the vertices of the sampled frames [m].
+        rms: root mean square over the vertices, of the sampled frames for a skin alone [m].
         greatest: maximum over the same vertices [m].
     """
 
@@ -50,8 +55,9 @@ class GltfExport:
     linear blend skinning with four nodes per vertex, which approximates the performed surface. The
     weights come from the character's file, or are fitted to up to 64 frames of the show.
     Morph targets that the show moved are written with their weights, by the same way as the nodes.
-    `deviation` measures the error; the file has it too, in the mesh's ``extras``. The point cache
-    and the USD export hold the exact surface.
+    With `within`, corrective morph targets bring every vertex of every frame that near to where it
+    was performed: as few as do. `deviation` measures the error; the file has it too, in the mesh's
+    ``extras``. The point cache and the USD export hold the exact surface.
 
     The file is written at the end, in one piece.
 
@@ -61,6 +67,8 @@ class GltfExport:
     Args:
         path: ends in .glb.
         character: the performed character.
+        within: how far a vertex may be from the performed surface, as a share of the character's
+            height; None for the skin alone.
 
     Raises:
         InputError: the suffix is not .glb, or the file cannot be written.
@@ -68,7 +76,7 @@ class GltfExport:
 
     pictures_a_second = 0.0
 
-    def __init__(self, path: Path, character: Character) -> None:
+    def __init__(self, path: Path, character: Character, *, within: float | None = None) -> None:
         check_suffix(path, (".glb",))
         check_writable(path)
         self._path, self._character = path, character
@@ -77,13 +85,27 @@ class GltfExport:
         self._samples: list[PerformedFrame] = []
         self._stride = 1  # frames per kept sample
         self._written = 0
+        self._within = within
+        self._surfaces = SurfaceFile(path, len(character.vertices)) if within is not None else None
+        self._correction: Correction | None = None
         self._closed = False
         self.deviation: SkinDeviation | None = None
 
     def write(self, frame: PerformedFrame) -> None:
-        """Store one frame."""
+        """Store one frame.
+
+        Raises:
+            InputError: the disk fails; then no file is written.
+        """
         if self._motion.add(frame):
             self._morphs.add(frame)
+            if self._surfaces is not None:
+                try:
+                    self._surfaces.write(frame.vertices)
+                except InputError:
+                    self._closed = True
+                    self._surfaces.close()
+                    raise
         if self._written % self._stride == 0:
             self._samples.append(replace(frame, vertices=frame.vertices.copy(), picture=None))
             if len(self._samples) > _SAMPLES:
@@ -100,11 +122,15 @@ class GltfExport:
         if self._closed:
             return
         self._closed = True
-        skin = self._fitted_skin()
+        skin, motion = self._fitted_skin(), self._motion.motion()
+        if self._surfaces is not None:
+            with closing(self._surfaces):
+                skin = self._corrected(skin, motion, self._surfaces)
         builder = GlbBuilder()
+        shapes = MovedShapes(builder, self._character, self._morphs, self._correction)
         _add_skeleton(builder, self._character)
-        _add_mesh(builder, self._character, skin, self.deviation, self._morphs)
-        _add_animation(builder, self._character, self._motion.motion(), self._morphs)
+        _add_mesh(builder, self._character, skin, self.deviation, shapes)
+        _add_animation(builder, self._character, motion, shapes)
         builder.save(self._path)
 
     @property
@@ -113,9 +139,15 @@ class GltfExport:
         off = self.deviation
         if off is None:
             return ""
+        if self._correction is not None:
+            count = len(self._correction.targets)
+            return (
+                f"within {millimetres(off.greatest)} mm of the performed surface, by a skin and "
+                f"{counting(count, 'corrective shape')}"
+            )
         return (
-            f"skinned {_millimetres(off.rms)} mm from the performed surface (RMS), "
-            f"{_millimetres(off.greatest)} mm at most"
+            f"skinned {millimetres(off.rms)} mm from the performed surface (RMS), "
+            f"{millimetres(off.greatest)} mm at most"
         )
 
     def _fitted_skin(self) -> Skin:
@@ -136,6 +168,25 @@ class GltfExport:
             off = deviations(vertices, tree, skin, self._morphs.undone(samples, frames, skin))
             self.deviation = SkinDeviation(float(np.sqrt(np.mean(off**2))), float(off.max()))
         return skin
+
+    def _corrected(self, skin: Skin, motion: NodeMotion, surfaces: SurfaceFile) -> Skin:
+        """Find what corrects the skin; return the skin that is corrected."""
+        assert self._within is not None
+        vertices, frames = self._character.vertices, len(motion.times)
+        size, height = np.ptp(vertices, axis=0).max(), np.ptp(vertices[:, 1])
+        with closing(SurfaceFile(self._path, len(vertices))) as wanted:
+            self._correction = found = correct(
+                vertices,
+                self._character.skeleton.tree,
+                skin,
+                motion,
+                surfaces.surfaces(frames),
+                wanted,
+                max(self._within * float(height), _FINEST * float(size)),
+                self._morphs.deltas_at,
+            )
+        self.deviation = SkinDeviation(found.rms, found.greatest) if frames else None
+        return found.skin
 
     def __enter__(self) -> Self:
         return self
@@ -176,11 +227,11 @@ def _add_mesh(
     character: Character,
     skin: Skin,
     deviation: SkinDeviation | None,
-    morphs: MorphExport,
+    shapes: MovedShapes,
 ) -> None:
     """Add one primitive for each material in use; all share the same vertices."""
     surface = character.surface
-    attributes, targets = _attributes(builder, character, skin), morphs.targets(builder)
+    attributes, targets = _attributes(builder, character, skin), shapes.targets
     primitives: list[dict[str, Any]] = []
     materials: list[dict[str, Any]] = []
     for material in np.unique(surface.face_material):
@@ -203,7 +254,7 @@ def _add_mesh(
         }
     if targets:
         mesh["weights"] = [0.0] * len(targets)
-        extras["targetNames"] = morphs.names
+        extras["targetNames"] = shapes.names
     if extras:
         mesh["extras"] = extras
     builder.document |= {"meshes": [mesh], "materials": materials}
@@ -253,7 +304,7 @@ def _material(builder: GlbBuilder, surface: Surface, material: Material) -> dict
 
 
 def _add_animation(
-    builder: GlbBuilder, character: Character, motion: NodeMotion, morphs: MorphExport
+    builder: GlbBuilder, character: Character, motion: NodeMotion, shapes: MovedShapes
 ) -> None:
     """Add channels only for motion: a bone that keeps its length has no translation channel."""
     if len(motion.times) == 0:
@@ -277,7 +328,7 @@ def _add_animation(
             add(node, "translation", translations[:, node])
         if np.abs(rotations[:, node, :3]).max() > _STILL:
             add(node, "rotation", rotations[:, node])
-    weights = morphs.weights
+    weights = shapes.weights
     if weights.size:
         add(len(rest), "weights", weights.ravel())
     if channels:
@@ -297,8 +348,3 @@ def _vertex_normals(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> 
         normals, lengths, out=np.tile([0.0, 1.0, 0.0], (len(vertices), 1)), where=lengths > 0
     )
     return unit
-
-
-def _millimetres(metres: float) -> str:
-    """For reading; two digits below ten."""
-    return f"{1e3 * metres:.2g}" if metres < 0.01 else f"{1e3 * metres:.0f}"

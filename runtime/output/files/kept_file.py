@@ -135,3 +135,8 @@ def size_of(path: Path) -> str:
 def counting(count: int, thing: str) -> str:
     """A number of things in words."""
     return f"{count} {thing}" if count == 1 else f"{count} {thing}s"
+
+
+def millimetres(metres: float) -> str:
+    """A length in millimetres for reading; two digits below ten."""
+    return f"{1e3 * metres:.2g}" if metres < 0.01 else f"{1e3 * metres:.0f}"

@@ -1,8 +1,8 @@
-"""Morph targets of a performed character in a .glb: the targets that moved, and their weights."""
+"""Morph targets of a performed character in a .glb: those that moved, and those that correct."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from runtime.characters.character import Character
 from runtime.output.files.glb import ARRAY_BUFFER, GlbBuilder
+from runtime.output.files.surface_correction import Correction
 from runtime.output.output import PerformedFrame
 from solvers.surface.skin_weights import PosedSamples, Skin
 
@@ -56,6 +57,11 @@ class MorphExport:
         rows = np.array(self._rows, dtype=np.float32).reshape(len(self._rows), self._count)
         return rows[:, self._moved()]
 
+    def deltas_at(self, frame: int) -> Array | None:
+        """What the targets add at rest (N, 3) in a frame that was stored; None for nothing."""
+        weights = self._rows[frame].astype(np.float64)
+        return self._deltas(weights) if weights.any() else None
+
     def undone(
         self, samples: PosedSamples, frames: Sequence[PerformedFrame], skin: Skin
     ) -> PosedSamples:
@@ -94,3 +100,51 @@ class MorphExport:
                 own = slice(targets.starts[target], targets.starts[target + 1])
                 np.add.at(sums, targets.vertices[own], weights[target] * targets.deltas[own])
         return sums
+
+
+class MovedShapes:
+    """All morph targets of a file, stored in it, and their weights in every frame.
+
+    Args:
+        builder: of the file.
+        character: the performed character.
+        morphs: its own targets come first.
+        correction: of its skin, whose targets come after them; None for none.
+
+    Attributes:
+        targets: the entry of each target for every primitive.
+        names: of the targets.
+        weights: (frames, targets).
+    """
+
+    def __init__(
+        self,
+        builder: GlbBuilder,
+        character: Character,
+        morphs: MorphExport,
+        correction: Correction | None,
+    ) -> None:
+        self.targets, self.names, self.weights = (
+            morphs.targets(builder),
+            morphs.names,
+            morphs.weights,
+        )
+        if correction is None:
+            return
+        self.targets = [*self.targets, *_corrective(builder, character, correction)]
+        numbers = range(1, len(correction.targets) + 1)
+        self.names = [*self.names, *(f"corrective {number}" for number in numbers)]
+        self.weights = np.concatenate([self.weights, correction.weights], axis=1)
+
+
+def _corrective(
+    builder: GlbBuilder, character: Character, correction: Correction
+) -> Iterator[dict[str, int]]:
+    """Store corrective targets, without the vertices that none of them moves."""
+    row = np.full(len(character.vertices), -1)
+    row[correction.vertices] = np.arange(len(correction.vertices))
+    rows = row[character.surface.vertex]  # of the file's vertices
+    places = np.flatnonzero(rows >= 0)
+    view = builder.add_places(places.astype(np.uint32)) if len(correction.targets) else -1
+    for target in correction.targets:
+        yield {"POSITION": builder.add_sparse(target[rows[places]], view, len(rows))}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +13,12 @@ from pygltflib import GLTF2
 from replay.builtin import builtin_recording
 from replay.joint_table import write_joint_table
 from replay.recorder import Recorder
+from runtime.characters.open_character import load_character
 from runtime.cli.command_line import main
 from runtime.session.files.store import SessionStore
 from runtime.session.nobody import nobody_for
+from tests.runtime.output.files.bvh_player import BvhPlayer
+from tests.runtime.output.files.glb_player import Player
 from tests.runtime.output.files.test_point_cache import read_pc2
 
 CUBE = """mtllib look.mtl
@@ -151,10 +155,44 @@ def test_render_gives_the_same_bytes_from_any_moment_on(saved: Path, tmp_path: P
     assert np.ptp(whole, axis=0).max() > 0.1
 
 
-def test_an_export_shows_what_the_program_shows(saved: Path, tmp_path: Path) -> None:
-    options = ["--rate", "10", "--to", "1.0", "--export", str(tmp_path / "a.glb")]
-    assert main(["render", str(saved), *options]) == 0
-    assert GLTF2().load(str(tmp_path / "a.glb")).animations
+def test_exports_of_layers_show_in_other_programs_what_the_program_shows(
+    saved: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    layered = tmp_path / "t.bunraku"
+    adds = {"edit": "additive", "clip": 2, "on": True}
+    assert edited(saved, layered, adds, {"edit": "move", "clip": 2, "start": 0.4}) == 0
+    options = ["--rate", "10", "--to", "1.5"]
+    performed = cached(layered, tmp_path / "a.pc2", *options)
+    character = load_character("squid")
+    to_stage = character.file_to_stage
+    height = np.ptp(character.vertices[:, 1])
+    assert main(["render", str(layered), *options, "--export", str(tmp_path / "a.glb")]) == 0
+    said = capsys.readouterr().out.splitlines()[-1]
+    assert re.search(r"a\.glb: 16 frames, .* MB, within [\d.]+ mm of .* corrective shapes$", said)
+    player = Player(tmp_path / "a.glb")
+    for number in (0, 3, 8, 15):
+        expected = performed[number] @ to_stage[:3, :3].T + to_stage[:3, 3]
+        off = np.linalg.norm(player.vertices(0.1 * number) - expected, axis=1)
+        assert off.max() < 1e-4 * height
+    assert main(["render", str(layered), *options, "--export", str(tmp_path / "a.bvh")]) == 0
+    joints = BvhPlayer(tmp_path / "a.bvh")
+    for number in (0, 3, 8, 15):
+        nodes = player.node_matrices(0.1 * number)[:, :3, 3]
+        places = joints.positions(number)
+        for name, node in zip(character.skeleton.names, nodes, strict=False):
+            if (written := name.replace(" ", "_")) in places:
+                assert np.linalg.norm(0.01 * places[written] - node) < 1e-4 * height
+
+
+def test_a_plain_skin_can_be_chosen(
+    saved: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    options = ["--rate", "5", "--to", "1.0", "--export", str(tmp_path / "a.glb")]
+    assert main(["render", str(saved), *options, "--export-within", "rigid"]) == 0
+    assert ", skinned " in capsys.readouterr().out.splitlines()[-1]
+    assert not GLTF2().load(str(tmp_path / "a.glb")).meshes[0].primitives[0].targets
+    assert main(["render", str(saved), *options, "--export-within", "0"]) == 2
+    assert "from 1e-06 to 1, got '0'" in capsys.readouterr().err
 
 
 def test_a_session_holds_the_files_of_its_characters(tmp_path: Path, recording: Path) -> None:

@@ -19,13 +19,17 @@ from runtime.characters.character import Character
 from runtime.driving.targets import PosedNodes
 from runtime.output.files.bvh_export import BvhExport
 from runtime.output.output import PerformedFrame
-from tests.runtime.tentacle import NODES, make_show, make_tentacle
+from tests.runtime.output.files.bvh_player import BvhPlayer
+from tests.runtime.tentacle import HEIGHT, NODES, make_show, make_tentacle
 
 
-def export(path: Path, character: Character, show: list[PerformedFrame]) -> None:
-    with BvhExport(path, character) as output:
+def export(
+    path: Path, character: Character, show: list[PerformedFrame], within: float | None = None
+) -> BvhExport:
+    with BvhExport(path, character, within=within) as output:
         for frame in show:
             output.write(frame)
+    return output
 
 
 def read(path: Path) -> tuple[list[str], NDArray[np.float64], NDArray[np.float64], float]:
@@ -86,6 +90,46 @@ def test_a_branching_skeleton_comes_back_with_its_limbs(tmp_path: Path) -> None:
     order = [skeleton.index(name) for name in names]
     expected = np.stack([frame.nodes.positions[order] for frame in show])
     np.testing.assert_allclose(positions, expected, atol=1e-5)
+
+
+def stretching(character: Character) -> list[PerformedFrame]:
+    """A show in which the last bone grows to twice its length."""
+    show = []
+    for frame in make_show(character):
+        positions = frame.nodes.positions.copy()
+        positions[-1] += frame.index / 39 * (positions[-1] - positions[-2])
+        show.append(replace(frame, nodes=replace(frame.nodes, positions=positions)))
+    return show
+
+
+def furthest(path: Path, show: list[PerformedFrame]) -> float:
+    """How far a joint is from its node at most [m], as another program plays the file."""
+    player = BvhPlayer(path)
+    off = [
+        np.linalg.norm(0.01 * player.positions(number)[f"node_{node}"] - place)
+        for number, frame in enumerate(show)
+        for node, place in enumerate(frame.nodes.positions)
+    ]
+    return float(np.max(off))
+
+
+def test_rigid_bones_are_told_by_how_much_they_are_off(tmp_path: Path) -> None:
+    character = make_tentacle()
+    show = stretching(character)
+    output = export(tmp_path / "a.bvh", character, show)
+    bone = HEIGHT / (NODES - 1)
+    assert furthest(tmp_path / "a.bvh", show) == pytest.approx(bone, rel=1e-3)
+    assert output.error == f"joints within {1e3 * bone:.0f} mm"
+
+
+def test_a_joint_whose_bone_grows_slides_where_that_is_asked_for(tmp_path: Path) -> None:
+    character = make_tentacle()
+    show = stretching(character)
+    output = export(tmp_path / "a.bvh", character, show, 1e-4)
+    assert furthest(tmp_path / "a.bvh", show) < 1e-4 * HEIGHT
+    assert float(output.error.split()[2]) < 0.1 * HEIGHT
+    assert (tmp_path / "a.bvh").read_text().count("CHANNELS 6") == 2, "the root and the last joint"
+    np.testing.assert_allclose(read(tmp_path / "a.bvh")[1][39], show[39].nodes.positions, atol=1e-6)
 
 
 def test_jitter_and_gaps_keep_their_timing(tmp_path: Path) -> None:

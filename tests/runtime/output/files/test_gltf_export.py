@@ -8,12 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pygltflib
 import pytest
 import trimesh
-from numpy.typing import NDArray
 from scipy.sparse import csr_array
-from scipy.spatial.transform import Rotation, Slerp
+from scipy.spatial.transform import Rotation
 
 from devices.errors import InputError
 from replay.formats import read_recording
@@ -23,93 +21,17 @@ from runtime.driving.targets import PosedNodes
 from runtime.output.files.gltf_export import GltfExport
 from runtime.output.output import PerformedFrame
 from solvers.deform.morph_targets import MorphTargets
-from tests.runtime.tentacle import HEIGHT, NODES, make_show, make_tentacle
+from tests.runtime.output.files.glb_player import Player
+from tests.runtime.tentacle import HEIGHT, NODES, disk_of, make_show, make_tentacle
 
 
-def export(path: Path, character: Character, show: list[PerformedFrame]) -> GltfExport:
-    with GltfExport(path, character) as output:
+def export(
+    path: Path, character: Character, show: list[PerformedFrame], within: float | None = None
+) -> GltfExport:
+    with GltfExport(path, character, within=within) as output:
         for frame in show:
             output.write(frame)
     return output
-
-
-class Player:
-    """Poses a .glb as the specification says, from what pygltflib reads."""
-
-    def __init__(self, path: Path) -> None:
-        self.gltf = pygltflib.GLTF2().load(str(path))
-        self.blob = self.gltf.binary_blob()
-
-    def array(self, accessor: int) -> NDArray[np.generic]:
-        described = self.gltf.accessors[accessor]
-        view = self.gltf.bufferViews[described.bufferView]
-        kinds = {5126: "<f4", 5125: "<u4", 5123: "<u2"}
-        width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}[described.type]
-        values = np.frombuffer(
-            self.blob, kinds[described.componentType], described.count * width, view.byteOffset
-        )
-        assert values.nbytes == view.byteLength
-        return values.reshape(described.count, width)
-
-    def node_matrices(self, time: float) -> NDArray[np.float64]:
-        """Global matrices (nodes, 4, 4) at `time` [s]."""
-        local = [[np.array(node.translation or (0, 0, 0)), Rotation.identity()]
-                 for node in self.gltf.nodes]  # fmt: skip
-        for animation in self.gltf.animations:
-            for channel in animation.channels:
-                if channel.target.path == "weights":
-                    continue
-                sampler = animation.samplers[channel.sampler]
-                times = self.array(sampler.input)[:, 0].astype(float)
-                values = self.array(sampler.output).astype(float)
-                if channel.target.path == "translation":
-                    moved = [np.interp(time, times, values[:, axis]) for axis in range(3)]
-                    local[channel.target.node][0] = np.array(moved)
-                else:
-                    turns = Rotation.from_quat(values)
-                    shown = np.clip(time, times[0], times[-1])
-                    turn = Slerp(times, turns)(shown) if len(times) > 1 else turns[0]
-                    local[channel.target.node][1] = turn
-        matrices = np.tile(np.eye(4), (len(local), 1, 1))
-
-        def place(node: int, parent: NDArray[np.float64]) -> None:
-            matrices[node, :3, :3] = local[node][1].as_matrix()
-            matrices[node, :3, 3] = local[node][0]
-            matrices[node] = parent @ matrices[node]
-            for child in self.gltf.nodes[node].children or ():
-                place(child, matrices[node])
-
-        for root in self.gltf.scenes[self.gltf.scene].nodes:
-            place(root, np.eye(4))
-        return matrices
-
-    def morph_weights(self, time: float) -> NDArray[np.float64]:
-        """The weights of the mesh's morph targets at `time` [s]."""
-        for animation in self.gltf.animations:
-            for channel in animation.channels:
-                if channel.target.path == "weights":
-                    assert self.gltf.nodes[channel.target.node].mesh == 0
-                    sampler = animation.samplers[channel.sampler]
-                    times = self.array(sampler.input)[:, 0].astype(float)
-                    rows = self.array(sampler.output).astype(float).reshape(len(times), -1)
-                    return np.array([np.interp(time, times, row) for row in rows.T])
-        return np.array(self.gltf.meshes[0].weights or [])
-
-    def vertices(self, time: float) -> NDArray[np.float64]:
-        """Morphed and skinned file vertices (M, 3) at `time` [s]."""
-        primitive = self.gltf.meshes[0].primitives[0]
-        attributes = primitive.attributes
-        positions = self.array(attributes.POSITION).astype(float)
-        for weight, target in zip(self.morph_weights(time), primitive.targets or [], strict=True):
-            positions += weight * self.array(target["POSITION"])
-        skin = self.gltf.skins[0]
-        bind = self.array(skin.inverseBindMatrices).reshape(-1, 4, 4).transpose(0, 2, 1)
-        joints = self.node_matrices(time)[skin.joints] @ bind
-        nodes = self.array(attributes.JOINTS_0)
-        weights = self.array(attributes.WEIGHTS_0).astype(float)
-        np.testing.assert_allclose(weights.sum(axis=1), 1, atol=1e-6)
-        rest = np.c_[positions, np.ones(len(nodes))]
-        return np.einsum("nc,ncij,nj->ni", weights, joints[nodes], rest)[:, :3]
 
 
 def test_the_skinned_surface_follows_the_performed_one(tmp_path: Path) -> None:
@@ -156,6 +78,115 @@ def test_morphs_are_written_with_their_weights(tmp_path: Path) -> None:
         expected = frame.vertices[character.surface.vertex]
         np.testing.assert_allclose(player.vertices(frame.time), expected, atol=0.004 * HEIGHT)
     assert output.deviation.rms < 1e-3 * HEIGHT
+
+
+def wobbling(character: Character, frames: int = 100) -> list[PerformedFrame]:
+    """A show whose surface leaves what a skin can reach, each frame in its own way."""
+    x, y, z = character.vertices.T
+    show = []
+    for frame in make_show(character, frames=frames):
+        wave = np.sin(9.0 * y + 0.3 * frame.index) * np.clip(y - 0.3 * HEIGHT, 0.0, None)
+        off = 0.2 * wave[:, None] * np.stack([z, 0.0 * y, x], axis=1)
+        show.append(replace(frame, vertices=frame.vertices + off))
+    return show
+
+
+@pytest.mark.parametrize("within", [4e-3, 1e-3, 1e-4])
+def test_corrective_shapes_bring_the_surface_to_the_stated_distance(
+    tmp_path: Path, within: float
+) -> None:
+    character = make_tentacle()
+    show = wobbling(character)
+    skin_alone = export(tmp_path / "s.glb", character, show)
+    assert skin_alone.deviation.greatest > 5e-3 * HEIGHT
+    output = export(tmp_path / "a.glb", character, show, within)
+    player = Player(tmp_path / "a.glb")
+    off = [
+        np.linalg.norm(
+            player.vertices(frame.time) - frame.vertices[character.surface.vertex], axis=1
+        )
+        for frame in show
+    ]
+    assert np.max(off) < within * HEIGHT
+    assert output.deviation.greatest >= np.max(off) - 2e-6 * HEIGHT
+    assert output.deviation.rms >= np.sqrt(np.mean(np.square(off))) - 2e-6 * HEIGHT
+    names = (player.gltf.meshes[0].extras or {}).get("targetNames", [])
+    assert output.error.endswith(f"by a skin and {len(names)} corrective shapes")
+    assert len(names) < 20, "far fewer shapes than frames"
+    weights = np.array([player.morph_weights(frame.time) for frame in show])
+    assert weights.size == 0 or (weights.min() >= 0.0 and weights.max() <= 1.0)
+
+
+def test_corrective_shapes_leave_out_vertices_that_need_none(tmp_path: Path) -> None:
+    character = make_tentacle()
+    export(tmp_path / "a.glb", character, wobbling(character), 1e-3)
+    player = Player(tmp_path / "a.glb")
+    targets = player.gltf.meshes[0].primitives[0].targets
+    corrected = {player.gltf.accessors[each["POSITION"]].sparse.count for each in targets}
+    assert len(corrected) == 1
+    assert 0 < corrected.pop() < 0.9 * len(character.surface.vertex)
+
+
+def test_a_skin_that_is_near_enough_gets_no_shapes(tmp_path: Path) -> None:
+    character = make_tentacle()
+    output = export(tmp_path / "a.glb", character, make_show(character), 1e-2)
+    assert not Player(tmp_path / "a.glb").gltf.meshes[0].primitives[0].targets
+    assert output.error.endswith("by a skin and 0 corrective shapes")
+
+
+def test_corrective_shapes_come_after_the_faces_morphs(tmp_path: Path) -> None:
+    character = expressive(make_tentacle())
+    targets = character.morphs.targets
+    own = slice(targets.starts[1], targets.starts[2])
+    show = []
+    for index, plain in enumerate(wobbling(character, 40)):
+        weight = 0.5 - 0.5 * np.cos(0.3 * index)
+        wide = plain.vertices.copy()
+        wide[targets.vertices[own]] += weight * targets.deltas[own]
+        show.append(replace(plain, vertices=wide, weights=np.array([0.0, weight])))
+    export(tmp_path / "b.glb", character, show, 1e-4)
+    player = Player(tmp_path / "b.glb")
+    names = player.gltf.meshes[0].extras["targetNames"]
+    assert names[:2] == ["wide", "corrective 1"]
+    for frame in (show[0], show[11], show[17], show[-1]):
+        expected = frame.vertices[character.surface.vertex]
+        np.testing.assert_allclose(player.vertices(frame.time), expected, atol=1e-4 * HEIGHT)
+
+
+def test_vertices_that_a_skin_would_flatten_are_corrected_too(tmp_path: Path) -> None:
+    character = make_tentacle()
+    show = []
+    for frame in make_show(character, frames=30):  # every second node turns over by half a turn
+        twist = Rotation.from_euler("y", np.where(np.arange(NODES) % 2, 6.0 * frame.index, 0.0)
+                                    [:, None], degrees=True)  # fmt: skip
+        nodes = PosedNodes(character.skeleton.rest_positions, twist.as_quat())
+        show.append(replace(frame, vertices=character.vertices, nodes=nodes))
+    export(tmp_path / "a.glb", character, show, 1e-4)
+    player = Player(tmp_path / "a.glb")
+    for frame in show[::5] + show[-1:]:
+        off = player.vertices(frame.time) - character.vertices[character.surface.vertex]
+        assert np.linalg.norm(off, axis=1).max() < 1e-4 * HEIGHT
+
+
+@pytest.mark.parametrize("frames", [0, 1, 2])
+def test_short_shows_are_corrected(tmp_path: Path, frames: int) -> None:
+    character = make_tentacle()
+    show = wobbling(character, frames)
+    export(tmp_path / "a.glb", character, [*show, *show[-1:]], 1e-4)
+    player = Player(tmp_path / "a.glb")
+    for frame in show:
+        expected = frame.vertices[character.surface.vertex]
+        np.testing.assert_allclose(player.vertices(frame.time), expected, atol=1e-4 * HEIGHT)
+
+
+def test_a_full_disk_leaves_no_corrected_file(tmp_path: Path) -> None:
+    character = make_tentacle()
+    output = GltfExport(tmp_path / "a.glb", character, within=1e-4)
+    show = make_show(character, frames=400)
+    with disk_of(200_000), pytest.raises(InputError, match=r"cannot write .*a\.glb"):
+        list(map(output.write, show))
+    output.close()
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_show_without_a_face_gives_the_same_file(tmp_path: Path) -> None:
