@@ -15,6 +15,7 @@ from devices.errors import InputError
 from runtime.driving.body.bearing import Bearing, is_low, low_bearing, room_below
 from runtime.driving.body.body_parts import TwoBodies, body_parts
 from runtime.driving.body.footing import Footing, FootingState
+from runtime.driving.body.forelegs import Forelegs
 from runtime.driving.body.held_hands import HeldHands, are_held
 from runtime.driving.body.joint_turns import JointTurns
 from runtime.driving.body.long_arms import LongArms
@@ -38,7 +39,7 @@ from solvers.skeleton.quaternions import multiply, rotate
 Array = NDArray[np.float64]
 
 _LEVEL = 0.3  # least level share of the axis through both hips, of a body that stands
-_FORELEGS_LIFT = np.array([1.0, 1.0, 0.0])  # pelvis and chest; the head looks where it looked
+_FORELEGS_REACH = np.array([1.0, 1.0, 0.0])  # pelvis and chest; the head looks where it looked
 _MEASURED = 64  # poses of a clip in which the upright body is measured
 
 
@@ -132,6 +133,7 @@ class BodyDriver:
         self._ends = _ends(bodies)
         self._held_hands = HeldHands(bodies) if are_held(bodies) else None
         self._rearing = Rearing(bodies)
+        self._forelegs = Forelegs(bodies, parts.arms, (vertices, skeleton.skin), self._ratio)
         self._long_arms = LongArms(bodies.tree, vertices, owner, parts.arms, parts.legs)
         self._at_rest = Targets(skeleton.skinned(skeleton.rest_nodes), nodes=skeleton.rest_nodes)
         self._rest: Rest | None = None
@@ -196,11 +198,9 @@ class BodyDriver:
         if self._many_legs is not None:
             self._many_legs.step(joints, positions, rotations, given)
             pose_limbs(rig, joints, trunk, given, self._twists, rotations, positions)
+        if self._forelegs.follow(joints, self._footing.heights):
+            trunk = self._on_forelegs((positions, rotations), joints, trunk, left, given)
         above = self._ratio * self._footing.above
-        rise = self._long_arms.rise(positions, above)
-        if rise != 0.0:
-            trunk = pitched(trunk, rise * _FORELEGS_LIFT, left)
-            pose_limbs(rig, joints, trunk, given, self._twists, rotations, positions)
         across = rotate(trunk[1], self._left)
         if self._long_arms.spread_wings(positions, rotations, given, across, above):
             pose_limbs(rig, joints, trunk, given, self._twists, rotations, positions)
@@ -225,6 +225,28 @@ class BodyDriver:
         shape = self._skeleton.skinned(self._nodes)
         placement = path.placement(self._footing.clearance(pose))
         return Targets(shape, placement, self._nodes)
+
+    def _on_forelegs(
+        self, nodes: tuple[Array, Array], joints: Array, trunk: Array, left: Array, given: Array
+    ) -> Array:
+        """Let forelegs stand; return the turns (3, 4) of the trunk, which sinks until they do.
+
+        Args:
+            nodes: positions (K, 3) [m] and rotations (K, 4); they are changed, as is `given`.
+            joints: (J, 3) [m] the performer, turned as the character faces.
+            trunk: (3, 4) as it would turn without them.
+            left: (3,) the body's left.
+            given: (S, 4) rotations of the segments.
+        """
+        rig, (positions, rotations) = self._parts.rig, nodes
+        sinks = self._forelegs.sinks(positions, rotations)
+        if sinks != 0.0:
+            trunk = pitched(trunk, -sinks * _FORELEGS_REACH, left)
+            pose_limbs(rig, joints, trunk, given, self._twists, rotations, positions)
+        for put in (self._forelegs.plant, self._forelegs.stand):
+            put(positions, rotations, given)
+            pose_limbs(rig, joints, trunk, given, self._twists, rotations, positions)
+        return trunk
 
     def _levelled(self, pelvis: Array) -> Array:
         """The turn (4,) of a pelvis that sinks on one side as the performer's, in leg lengths.

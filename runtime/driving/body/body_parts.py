@@ -13,7 +13,7 @@ from devices.bodies.joint_labels import label_joints
 from devices.bodies.joint_names import Kind, Side
 from devices.skeleton import Skeleton
 from runtime.driving.body.rig_builder import RigBuilder
-from runtime.driving.driver import ABSOLUTE, RELATIVE, DrivenPart
+from runtime.driving.driver import RELATIVE, DrivenPart
 from runtime.driving.part_names import part_name
 from solvers.retarget.limb_posing import LimbRig
 from solvers.retarget.trunk_turns import TrunkJoints
@@ -41,17 +41,21 @@ class Leg:
 
 @dataclass(frozen=True, slots=True)
 class Arm:
-    """An arm of the character that points where the performer's points.
+    """An arm of the character that follows the performer's.
 
     Attributes:
+        side: of the body.
         target: nodes, from the shoulder outward.
         segments: numbers of its segments.
         starts: the node at which each begins.
+        wrist: the node at the end of the forearm.
     """
 
+    side: Side
     target: Chain
     segments: tuple[int, ...]
     starts: tuple[int, ...]
+    wrist: int
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +89,7 @@ class BodyParts:
         hand_change: (S, 4) from the character's hand at rest to the performer's at rest.
         skull: the performer's joint that turns the head; -1 for none.
         legs: the legs of both.
-        arms: the arms that are driven absolutely.
+        arms: the arms.
         steps: the legs of a body of many legs.
     """
 
@@ -208,9 +212,9 @@ def _pointing(bodies: TwoBodies, rig: RigBuilder, least_upright: float) -> _Limb
         palms = _knuckles(source, side), _knuckles(plan, side)
         numbers = rig.add_arm(theirs, ours, *palms, drive)
         limbs.parts.append(bodies.part(theirs.chain, ours.chain, drive))
-        if drive == ABSOLUTE:
-            starts = tuple(chain[0] for chain in ours.segments[: len(numbers)])
-            limbs.arms.append(Arm(ours.chain, numbers, starts))
+        starts = tuple(chain[0] for chain in ours.segments[: len(numbers)])
+        wrist = (ours.lower or ours.upper)[-1]
+        limbs.arms.append(Arm(side, ours.chain, numbers, starts, wrist))
         rig.add_fingers(source, plan, side)
     return limbs
 

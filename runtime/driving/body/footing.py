@@ -196,6 +196,12 @@ class Footing:
         return True
 
     @property
+    def heights(self) -> Array:
+        """How far (F,) [m] the lower end of each of the performer's feet is above its floor."""
+        heights: Array = self._contacts.heights.min(axis=1) if len(self._legs) else np.zeros(0)
+        return heights
+
+    @property
     def above(self) -> float:
         """How far [m] the performer's lower foot is above where it stands."""
         return float(self._contacts.heights.min()) if len(self._legs) else 0.0

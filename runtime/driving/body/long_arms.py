@@ -16,7 +16,6 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.bodies.body_plan import Chain
 from runtime.driving.body.body_parts import Arm, Leg
 from runtime.driving.body.rig_builder import LOW
 from solvers.retarget.limb_posing import lift_segments
@@ -28,8 +27,6 @@ Array = NDArray[np.float64]
 _ASIDE = 0.3  # of an arm's length: an arm this far below the floor is laid out level
 _JUST = 0.25  # of the shoulder's height: what hangs farther below the floor is a wing
 _WITH_HAND = 3  # segments
-_HANGS = (0.6, 0.9)  # of its length below the shoulder: where a foreleg is lifted, and stands
-_TILT = tuple(np.radians((-10.0, 35.0)))  # of a trunk, down and up, to stand on its forelegs
 _THICK = 90.0  # percentile of the distances from the surface of a hand to its bones
 
 
@@ -40,7 +37,7 @@ class LongArms:
         tree: the character's nodes at rest.
         vertices: (C, 3) [m] of the surface at rest.
         owner: (C,) the node that each vertex follows most.
-        arms: those that are driven absolutely.
+        arms: those that are driven.
         legs: what the body stands on.
     """
 
@@ -52,13 +49,13 @@ class LongArms:
         arms: Sequence[Arm],
         legs: Sequence[Leg],
     ) -> None:
-        self._rest, self._root = tree.positions, tree.root
+        self._rest = tree.positions
         self._soles = np.array([leg.target[2:] for leg in legs], dtype=np.int64).ravel()
         self._arms = list(arms) if legs else []
         self._nodes = [list(tree.subtree(arm.target[0])[1:]) for arm in self._arms]
         low = self._rest[:, 1].min() + LOW * np.ptp(self._rest[:, 1])
         self._stands = [bool(self._rest[arm.target[-1], 1] < low) for arm in self._arms]
-        self._radii = [self._radius(arm.target, vertices, owner) for arm in self._arms]
+        self._radii = [self._radius(number, vertices, owner) for number in range(len(self._arms))]
         self._heights = [
             float(self._rest[arm.target[0], 1] - self._rest[:, 1].min()) for arm in self._arms
         ]
@@ -79,15 +76,20 @@ class LongArms:
         wrist = float(np.linalg.norm(self._rest[arm.starts[-1]] - self._rest[arm.target[0]]))
         return [node for node, far in zip(nodes, away, strict=True) if far > wrist]
 
-    def _radius(self, arm: Chain, vertices: Array, owner: NDArray[np.int64]) -> float:
-        """How far [m] the surface of a hand is from its bones."""
+    def _radius(self, number: int, vertices: Array, owner: NDArray[np.int64]) -> float:
+        """How far [m] the surface of a hand is from its bones; below them, of one that stands."""
+        arm = self._arms[number].target
         hand = vertices[np.isin(owner, arm[-2:])]
         if not len(hand):
             return 0.0
         a, b = self._rest[arm[-2]], self._rest[arm[-1]]
         along = (hand - a) @ (b - a) / max(float((b - a) @ (b - a)), 1e-12)
         gaps = hand - a - np.clip(along, 0.0, 1.0)[:, None] * (b - a)
-        return float(np.percentile(np.linalg.norm(gaps, axis=1), _THICK))
+        radius = float(np.percentile(np.linalg.norm(gaps, axis=1), _THICK))
+        if self._stands[number]:
+            lowest = float(self._rest[self._nodes[number], 1].min() - self._rest[:, 1].min())
+            return min(radius, lowest)
+        return radius
 
     def spread_wings(
         self, positions: Array, rotations: Array, given: Array, left: Array, above: float
@@ -105,7 +107,7 @@ class LongArms:
         """
         if not self._arms:
             return False
-        floor, asides, lifted = self._floor(positions, above), None, False
+        floor, asides, lifted = self.floor(positions, above), None, False
         for number, arm in enumerate(self._arms):
             reach = self._reaches[number]
             is_wing = reach + self._radii[number] > (1.0 + _JUST) * self._heights[number]
@@ -137,7 +139,7 @@ class LongArms:
         """
         if not self._arms:
             return False
-        floor, asides = self._floor(positions, above), self._asides(positions, left)
+        floor, asides = self.floor(positions, above), self._asides(positions, left)
         raised = False
         for number, arm in enumerate(self._arms):
             aside = asides[number]
@@ -159,33 +161,8 @@ class LongArms:
                 given[segment] = multiply(turn, rotations[node])
         return raised
 
-    def rise(self, positions: Array, above: float) -> float:
-        """Return the angle [rad] by which the trunk rises to stand on straight forelegs.
-
-        It sinks a little to those that hang above the floor. 0 for a body on two legs.
-
-        Args:
-            positions: (K, 3) [m] of the posed nodes.
-            above: [m] how far the feet are above where they stand.
-        """
-        if not self._stands or not all(self._stands):
-            return 0.0
-        floor, most = self._floor(positions, above), -np.inf
-        limbs = zip(self._arms, self._radii, self._nodes, self._reaches, strict=True)
-        for arm, radius, nodes, length in limbs:
-            way = positions[arm.target[0]] - self._rest[self._root]
-            lever = float(np.hypot(way[0], way[2]))
-            low = float(positions[nodes, 1].min()) - radius
-            reach = low - float(positions[arm.target[0], 1])
-            hangs = (-reach / max(length, 1e-9) - _HANGS[0]) / (_HANGS[1] - _HANGS[0])
-            sine = (floor - low) / max(lever, 1e-9)
-            if sine < 0.0:
-                sine *= float(np.clip(hangs, 0.0, 1.0))
-            most = max(most, sine)
-        return float(np.clip(np.arcsin(np.clip(most, -1.0, 1.0)), *_TILT))
-
-    def _floor(self, positions: Array, above: float) -> float:
-        """The height [m] of the floor below feet that are `above` [m] where they stand."""
+    def floor(self, positions: Array, above: float) -> float:
+        """Return the height [m] of the floor below feet that are `above` [m] where they stand."""
         soles = positions[self._soles, 1] - self._rest[self._soles, 1]
         return float(soles.min()) + float(self._rest[:, 1].min()) - max(above, 0.0)
 

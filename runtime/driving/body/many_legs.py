@@ -12,7 +12,6 @@ The gait of alternate legs: D. M. Wilson (1966), "Insect walking".
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
@@ -20,34 +19,14 @@ from numpy.typing import NDArray
 
 from devices.bodies.body_plan import SIDES, BodyPlan
 from runtime.driving.body.body_parts import Step, TwoBodies
+from runtime.driving.body.performer_steps import LIFTED, performer_steps
 from runtime.driving.root_motion import chain_length
 from solvers.retarget.two_bone_ik import two_bone_turns
 from solvers.skeleton.quaternions import multiply, rotate
 
 Array = NDArray[np.float64]
 
-_DOWN = np.array([0.0, -1.0, 0.0])
-_LIFTED = (0.15, 0.45)  # of an arm's length: a hand this far up leads a front leg not at all, fully
 _STRETCH = 0.02  # of the room below: feet reach so far below the floor, when the performer's do
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class _Performer:
-    """What steps follow.
-
-    Attributes:
-        ankles: (2,) left and right; -1 where legs are not known.
-        standing: (2, 3) [m] ankles from the middle of the hips while standing upright.
-        hips: (2,) where the legs begin.
-        hands: (2, 2) shoulder and wrist, left and right; -1 where they are not known.
-        arm: [m] length of an arm.
-    """
-
-    ankles: NDArray[np.int64]
-    standing: Array
-    hips: NDArray[np.int64]
-    hands: NDArray[np.int64]
-    arm: float
 
 
 class ManyLegs:
@@ -65,7 +44,7 @@ class ManyLegs:
 
     def __init__(self, bodies: TwoBodies, steps: Sequence[Step], room: float) -> None:
         tree, rest = bodies.tree, bodies.tree.positions
-        self._performer = _performer(bodies)
+        self._performer = performer_steps(bodies)
         self._room = room
         self._left = np.array([np.cos(bodies.facing), 0.0, -np.sin(bodies.facing)])
         self._joints = np.array([step.target for step in steps], dtype=np.int64)
@@ -79,7 +58,7 @@ class ManyLegs:
         # A knee that stands straight above its foot bends outward.
         across = np.cross(self._rest[:, 1] - self._rest[:, 0], self._rest[:, 2] - self._rest[:, 0])
         self._axes = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-12)
-        self.ratio = _stride(bodies.plan, rest) / max(_leg_length(bodies), 1e-9)
+        self.ratio = _stride(bodies.plan, rest) / max(self._performer.leg, 1e-9)
 
     def step(self, joints: Array, positions: Array, rotations: Array, given: Array) -> None:
         """Put the rotations of the legs into `given` (S, 4), those of all segments.
@@ -106,50 +85,20 @@ class ManyLegs:
         moves += ((steps[self._own] - moves) @ self._left)[:, None] * self._left
         arms = np.flatnonzero(self._arms & (self._performer.hands[self._own, 0] >= 0))
         for leg in arms:
-            shoulder, wrist = self._performer.hands[self._own[leg]]
-            move = (joints[wrist] - joints[shoulder]) / self._performer.arm - _DOWN
-            share = float(np.interp(move[1], _LIFTED, (0.0, 1.0)))
+            move = self._performer.of_hand(int(self._own[leg]), joints)
+            share = float(np.interp(move[1], LIFTED, (0.0, 1.0)))
             moves[leg] = (1.0 - share) * moves[leg] + share * self._long[leg] * move
         return moves
 
     def _steps(self, joints: Array) -> Array:
         """How far (2, 3) [m] the performer's feet are from standing, in the character's size."""
-        performer = self._performer
-        if performer.ankles.min() < 0:
-            return np.zeros((2, 3))
-        middle = joints[performer.hips].mean(axis=0)
-        steps: Array = self.ratio * (joints[performer.ankles] - middle - performer.standing)
+        steps: Array = self.ratio * self._performer.of_feet(joints)
+        if self._performer.ankles.min() < 0:
+            return steps
         # The trunk sinks as the performer's, but not into the floor.
         rise = float(steps[:, 1].min())
         steps[:, 1] += float(np.clip(rise, -_STRETCH * self._room, self._room)) - rise
         return steps
-
-
-def _performer(bodies: TwoBodies) -> _Performer:
-    legs, arms, upright = bodies.source.legs, bodies.source.arms, bodies.upright
-    ankles, hips = np.full(2, -1), np.full(2, -1)
-    standing = np.zeros((2, 3))
-    if len(legs) == len(SIDES):
-        ankles = np.array([(legs[side].lower or legs[side].upper)[-1] for side in SIDES])
-        hips = np.array([legs[side].upper[0] for side in SIDES])
-        standing = upright[hips] - upright[hips].mean(axis=0)
-        standing[:, 1] = -_leg_length(bodies)  # a rest pose may stand with its legs apart
-    hands = np.full((2, 2), -1)
-    lengths = [1.0]
-    for place, side in enumerate(SIDES):
-        if side in arms and bodies.joints.issuperset(arms[side].upper):
-            chain = (*arms[side].upper, *arms[side].lower[1:])
-            hands[place] = chain[0], chain[-1]
-            lengths.append(chain_length(bodies.performer.rest_positions, chain))
-    return _Performer(ankles, standing, hips, hands, float(np.mean(lengths[1:] or lengths)))
-
-
-def _leg_length(bodies: TwoBodies) -> float:
-    """The mean length [m] of the performer's legs; the height of one without legs."""
-    legs = [(*leg.upper, *leg.lower[1:]) for leg in bodies.source.legs.values()]
-    if not legs:
-        return float(np.ptp(bodies.upright[:, 1]))
-    return float(np.mean([chain_length(bodies.performer.rest_positions, leg) for leg in legs]))
 
 
 def _stride(plan: BodyPlan, rest: Array) -> float:

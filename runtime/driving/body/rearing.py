@@ -10,9 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.bodies.body_plan import SIDES, BodyPlan, Limb
+from devices.bodies.body_plan import SIDES, Limb
 from runtime.driving.body.body_parts import TwoBodies
-from runtime.driving.body.rig_builder import LOW
+from runtime.driving.body.forelegs import is_on_four
 from solvers.skeleton.quaternions import multiply
 
 Array = NDArray[np.float64]
@@ -22,7 +22,6 @@ MOST = np.radians(55.0)
 
 _RISES = (-0.6, 0.7)  # sine of the lower arm's elevation: from level to fully reared
 _SHARES = np.array([0.5, 1.0, 0.5])  # of pelvis, chest and head
-_LEVEL = 1.0  # of its length along the floor: a trunk that rises by more is upright
 
 
 class Rearing:
@@ -34,7 +33,7 @@ class Rearing:
 
     def __init__(self, bodies: TwoBodies) -> None:
         pairs = list(bodies.pairs(bodies.source.arms, bodies.plan.arms))
-        rears = len(pairs) == len(SIDES) and _is_on_four(bodies.plan, bodies.tree.positions)
+        rears = len(pairs) == len(SIDES) and is_on_four(bodies.plan, bodies.tree.positions)
         chains = [_to_wrist(theirs) for _, theirs, _ in pairs] if rears else []
         self._arms = [np.array(chain, dtype=np.int64) for chain in chains]
 
@@ -71,20 +70,6 @@ def pitched(trunk: Array, angles: Array, left: Array) -> Array:
     """
     half = -0.5 * angles[:, None]
     return multiply(np.concatenate([np.sin(half) * left, np.cos(half)], axis=1), trunk)
-
-
-def _is_on_four(plan: BodyPlan, rest: Array) -> bool:
-    """Whether a body's trunk is level and its arms stand on the floor."""
-    if len(plan.legs) < len(SIDES):
-        return False
-    hips, shoulders = (
-        np.mean([rest[limb.upper[0]] for limb in limbs.values()], axis=0)
-        for limbs in (plan.legs, plan.arms)
-    )
-    rise, way = shoulders[1] - hips[1], np.hypot(*(shoulders - hips)[[0, 2]])
-    low = rest[:, 1].min() + LOW * np.ptp(rest[:, 1])
-    stands = all(rest[limb.segments[-1][-1], 1] < low for limb in plan.arms.values())
-    return bool(stands and abs(rise) < _LEVEL * way)
 
 
 def _to_wrist(arm: Limb) -> tuple[int, ...]:

@@ -8,6 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from devices.bodies.joint_names import Side
 from runtime.driving.body.body_parts import Arm, Leg
 from runtime.driving.body.long_arms import LongArms
 from solvers.skeleton.tree import Tree
@@ -26,7 +27,7 @@ NODES = np.array(
 PARENTS = np.array([-1, 0, 1, 0, 3, 4])
 LEG = Leg((0, 1, 2, 2), (0, 1, 2, 2), (2, 3, -1))
 LEFT = np.array([1.0, 0.0, 0.0])
-WING = Arm((3, 4, 5), (0, 1), (3, 4))
+WING = Arm(Side.LEFT, (3, 4, 5), (0, 1), (3, 4), 5)
 
 
 def lying(arm: Arm = WING) -> LongArms:
@@ -75,7 +76,7 @@ def test_it_begins_where_the_floor_begins() -> None:
 
 
 def test_an_arm_that_does_not_reach_the_floor_is_let_be() -> None:
-    short = Arm((3, 4), (0,), (3,))
+    short = Arm(Side.LEFT, (3, 4), (0,), (3,), 4)
     positions, rotations = hung(Rotation.from_euler("z", -np.pi / 2.0))
     assert not lying(short).raise_arms(positions, rotations, np.zeros((4, 4)), LEFT, 0.0)
 
@@ -110,44 +111,11 @@ def test_a_foreleg_that_reaches_below_the_floor_slides_forward() -> None:
     assert way[0] == pytest.approx(0.0, abs=1e-9)
 
 
-def on_four(length: float, angle: float) -> tuple[LongArms, np.ndarray]:
-    """A body with a foreleg 1.2 ahead of its hips, and its nodes with that at an angle [rad].
-
-    The shoulder is 0.8 high, the foreleg stands at rest, and is `length` long where it points.
-    """
-    standing = NODES.copy()
-    standing[3:] = [[0.1, 0.8, 1.2], [0.1, 0.4, 1.2], [0.1, 0.0, 1.2]]
-    owner = np.full(1, 4)
-    body = LongArms(Tree(PARENTS, standing), standing[4:5], owner, [WING], [LEG])
-    posed = standing.copy()
-    way = np.array([0.0, -np.cos(angle), np.sin(angle)])
-    posed[4:] = posed[3] + np.outer([0.5 * length, length], way)
-    return body, posed
-
-
-def test_the_trunk_rises_to_stand_on_straight_forelegs_and_sinks_to_short_ones() -> None:
-    for length in (0.75, 0.8, 1.0):
-        body, posed = on_four(length, 0.0)
-        rise = body.rise(posed, 0.0)
-        assert 0.8 + 1.2 * np.sin(rise) == pytest.approx(length, abs=1e-9)
-    body, posed = on_four(3.0, 0.0)
-    assert body.rise(posed, 0.0) == pytest.approx(np.radians(35.0))
-
-
-def test_forelegs_that_are_lifted_do_not_lower_the_trunk() -> None:
-    body, posed = on_four(0.8, np.radians(70.0))
-    assert body.rise(posed, 0.0) == 0.0
-
-
-def test_the_trunk_of_a_bird_does_not_rise_for_its_wings() -> None:
-    assert lying().rise(hung(Rotation.from_euler("z", -np.pi / 2.0))[0], 0.0) == 0.0
-
-
 def test_an_arm_that_just_reaches_the_floor_points_right_and_its_hand_gives_way() -> None:
     straight = Rotation.from_euler("z", -np.pi / 2.0)
     nodes = np.append(NODES, [[0.0, 0.8, 0.0]], axis=0)
     nodes[4:, 0] = [0.6, 0.92, 1.07]  # 0.87 from the shoulder, which is 0.8 high
-    reaching = Arm((3, 4, 5, 6), (0, 1, 2), (3, 4, 5))
+    reaching = Arm(Side.LEFT, (3, 4, 5, 6), (0, 1, 2), (3, 4, 5), 5)
     arm = LongArms(Tree(np.append(PARENTS, 5), nodes), nodes[5:6], np.array([5]), [reaching], [LEG])
     positions, rotations = nodes.copy(), np.tile(straight.as_quat(), (7, 1))
     positions[3:] = nodes[3] + straight.apply(nodes[3:] - nodes[3])
@@ -186,7 +154,7 @@ def test_what_points_up_of_a_wing_is_let_be() -> None:
 
 
 def test_an_arm_that_is_no_wing_is_not_spread() -> None:
-    short = Arm((3, 4), (0,), (3,))
+    short = Arm(Side.LEFT, (3, 4), (0,), (3,), 4)
     positions, rotations = hung(Rotation.from_euler("z", -1.0))
     positions[3:, 1] -= 0.3  # a squat
     assert not lying(short).spread_wings(positions, rotations, np.zeros((4, 4)), LEFT, 0.0)

@@ -1,0 +1,147 @@
+"""An animal stands on all four feet while the arms hang, trots, and lifts a leg as an arm."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from devices.bodies.body_plan import SIDES
+from devices.bodies.plan_by_names import plan_by_names
+from devices.skeleton import Skeleton
+from runtime.characters.character import Character
+from runtime.characters.plan_by_shape import plan_by_shape
+from runtime.driving.body.body_driver import BodyDriver
+from runtime.driving.pairing import Pairing
+from runtime.driving.performer import Performer, rest_state
+from runtime.puppet.puppet import Puppet
+from solvers.skeleton.limbs import surface_points
+from solvers.skeleton.mirror_plane import mirror_planes
+from tests.runtime.capsule_bodies import DOG, capsule_body, character_of
+from tests.runtime.stick_figures import BODY, frame, pose
+
+HANGING = {"ShoulderLeft": (0.0, 0.0, -0.75), "ShoulderRight": (0.0, 0.0, 0.75)}
+STRIDE = {"HipLeft": (-0.5, 0.0, 0.0), "HipRight": (0.5, 0.0, 0.0)}
+
+Array = NDArray[np.float64]
+
+
+@pytest.fixture(scope="module")
+def dog() -> Character:
+    body = capsule_body(DOG)
+    planes = mirror_planes(surface_points(body.vertices, body.faces), 4)
+    plan = plan_by_shape(body.vertices, body.faces, body.tree, planes)
+    return replace(character_of(body), plan=plan)
+
+
+class Played:
+    """What a character shows of a performer who stands first.
+
+    Attributes:
+        lows: (frames, 2, 2) [m] of each limb, forelegs and hind legs, left and right.
+        feet: (frames, 2, 2, 3) [m] where they end, seen from the hips.
+    """
+
+    def __init__(self, character: Character, *poses: Array, performer: Skeleton = BODY) -> None:
+        plan, puppet = character.plan, Puppet(character)
+        assert plan is not None
+        joints = tuple(range(len(performer.names)))
+        skin, surface = puppet.bound_skeleton, puppet.surface
+        driver = BodyDriver(Pairing(performer, joints, puppet.character, skin, surface))
+        follower, start = Performer(performer), None
+        tree = skin.tree.rerooted(plan.hips)
+        limbs = [[pair[side] for side in SIDES] for pair in (plan.arms, plan.legs)]
+        owner = skin.skin.nodes[:, 0]
+        own = [[np.isin(owner, tree.subtree(limb.chain[0])) for limb in pair] for pair in limbs]
+        lows, feet = [], []
+        for number, positions in enumerate(poses):
+            seen = follower.follow(frame(positions, number / 30.0))
+            if start is None:
+                start = seen
+                driver.prepare([start], rest_state(start, heading=0.0))
+                puppet.drive_with(driver)
+            puppet.follow(seen)
+            motion = puppet.deform()
+            assert motion.nodes is not None
+            nodes = motion.nodes.positions
+            lows.append([[motion.vertices[each, 1].min() for each in pair] for pair in own])
+            feet.append([[nodes[limb.chain[-1]] - nodes[plan.hips] for limb in p] for p in limbs])
+        self.lows, self.feet = np.array(lows), np.array(feet)
+
+
+def arms(forward: float, bend: float) -> Array:
+    """Standing with arms that swing forward, elbows bent, by angles [rad]."""
+    turns = {}
+    for side, sign in (("Left", 1.0), ("Right", -1.0)):
+        turns[f"Shoulder{side}"] = (0.0, 0.0, -0.75 * sign)
+        turns[f"Elbow{side}"] = (-bend, 0.0, 0.0)
+    swung = pose(turns)
+    for side in ("Left", "Right"):
+        chain = [BODY.index(f"{name}{side}") for name in ("Shoulder", "Elbow", "Wrist", "Hand")]
+        ways = swung[chain] - swung[chain[0]]
+        cosine, sine = np.cos(forward), np.sin(forward)
+        y, z = ways[:, 1].copy(), ways[:, 2].copy()
+        ways[:, 1], ways[:, 2] = cosine * y + sine * z, cosine * z - sine * y
+        swung[chain] = swung[chain[0]] + ways
+    return swung
+
+
+@pytest.mark.parametrize(("forward", "bend"), [(0.0, 0.0), (0.2, 0.2), (-0.3, 0.0), (0.0, 0.35)])
+def test_all_four_feet_stand_on_the_floor_while_the_arms_hang(dog, forward, bend) -> None:
+    height = np.ptp(dog.vertices[:, 1])
+    shown = Played(dog, pose(HANGING), *[arms(forward, bend)] * 3)
+    assert np.abs(shown.lows[-1]).max() < 0.01 * height
+
+
+def test_the_forelegs_step_with_the_other_foot(dog) -> None:
+    shown = Played(dog, pose(HANGING), pose({**HANGING, **STRIDE}))
+    ahead = shown.feet[1, :, :, 2] - shown.feet[0, :, :, 2]
+    (fore_left, fore_right), (hind_left, hind_right) = ahead
+    assert hind_left > 0.1
+    assert hind_right < -0.1
+    assert fore_left == pytest.approx(hind_right, abs=0.05)
+    assert fore_right == pytest.approx(hind_left, abs=0.05)
+
+
+def test_a_lifted_arm_lifts_its_own_foreleg_alone(dog) -> None:
+    height = np.ptp(dog.vertices[:, 1])
+    shown = Played(dog, pose(HANGING), pose({**HANGING, "ShoulderLeft": (0.0, 0.0, 0.75)}))
+    (left, right), hind = shown.lows[1]
+    assert left > 0.2 * height
+    assert right < 0.01 * height
+    assert hind.max() < 0.01 * height
+
+
+def on_four() -> Skeleton:
+    """A performer on four legs, half a metre high."""
+    limbs = {"thigh": ("hips", 0.0), "upper_arm": ("chest", 0.6)}
+    joints = [
+        ("hips", "", (0.0, 0.5, 0.0)),
+        ("spine", "hips", (0.0, 0.5, 0.3)),
+        ("chest", "spine", (0.0, 0.5, 0.6)),
+    ]
+    for first, (hangs_on, z) in limbs.items():
+        lower, end = ("shin", "foot") if first == "thigh" else ("forearm", "hand")
+        for side, x in (("L", 0.1), ("R", -0.1)):
+            joints.append((f"{first}.{side}", hangs_on, (x, 0.48, z)))
+            joints.append((f"{lower}.{side}", f"{first}.{side}", (x, 0.24, z - 0.04)))
+            joints.append((f"{end}.{side}", f"{lower}.{side}", (x, 0.0, z)))
+    names = [name for name, _, _ in joints]
+    parents = np.array([names.index(above) if above else -1 for _, above, _ in joints])
+    return Skeleton(tuple(names), parents, np.array([place for *_, place in joints]))
+
+
+def test_the_forelegs_of_a_performer_on_four_legs_lead_those_of_their_own_side(dog) -> None:
+    performer = on_four()
+    assert plan_by_names(performer) is not None
+    rest = performer.rest_positions
+    step = rest.copy()
+    step[performer.names.index("hand.L")] += (0.0, 0.0, 0.15)
+    step[performer.names.index("forearm.L")] += (0.0, 0.0, 0.06)
+    shown = Played(dog, rest, step, performer=performer)
+    assert np.abs(shown.lows).max() < 0.01 * np.ptp(dog.vertices[:, 1])
+    ahead = shown.feet[1, 0, :, 2] - shown.feet[0, 0, :, 2]
+    assert ahead[0] > 0.1
+    assert abs(ahead[1]) < 0.01
