@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
+from scipy.spatial import cKDTree
 
 from runtime.characters.character import Character
 from runtime.characters.proxy import Proxy
@@ -141,6 +142,20 @@ class BoundSkeleton:
     def skinned(self, nodes: PosedNodes) -> SkinnedTargets:
         """Return the targets of the surface that follows the posed nodes by its skin."""
         return SkinnedTargets(self._skinned_surface.place(nodes.positions, nodes.rotations))
+
+    @cached_property
+    def bone_of_vertex(self) -> Indices:
+        """(N, 2) the near and the far node of the bone that each vertex of the character is on.
+
+        Near and far are as seen from `root`. At a fork both are the fork.
+        """
+        binding, proxy, character = self.binding, self._proxy, self._character
+        bones = np.column_stack([binding.pivot, binding.node])[binding.owner]
+        if len(proxy.kept) == len(character.vertices):
+            return bones
+        _, nearest = cKDTree(proxy.vertices).query(character.vertices)
+        every: Indices = bones[nearest]
+        return every
 
     def limb(self, chain: tuple[int, ...]) -> tuple[int, ...]:
         """Return the part of a chain of nodes that lies outside the trunk, two nodes at least."""
