@@ -59,6 +59,7 @@ class DrivenPart:
             rest pose as the performer's part turns.
         gain: share of the performer's motion that is carried over, in (0, 1].
         flip: whether the turns are mirrored.
+        delay: [s] how much later it follows.
     """
 
     name: str
@@ -68,9 +69,12 @@ class DrivenPart:
     drive: str
     gain: float = 1.0
     flip: bool = False
+    delay: float = 0.0
 
     def __str__(self) -> str:
-        return f"{self.name} -> {self.target_name}, {self.drive}, {100.0 * self.gain:.0f} %"
+        later = f", {self.delay:.2f} s later" if self.delay > 0.0 else ""
+        share = f"{100.0 * self.gain:.0f} %"
+        return f"{self.name} -> {self.target_name}, {self.drive}, {share}{later}"
 
 
 class Driver(Protocol):

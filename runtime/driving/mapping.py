@@ -11,6 +11,7 @@ from typing import Any
 from devices.bounded_json import parse_json
 from devices.errors import InputError
 from devices.skeleton import Skeleton
+from solvers.signal.delay_line import MOST as MOST_DELAY
 
 MAX_FILE = 1 << 20  # bytes; a mapping is a page of names
 
@@ -23,11 +24,13 @@ class Drive:
         source: joint indices from the root side outward, at least two.
         target: node indices from the root side outward, at least two.
         flip: turn the target's y-axis round, which mirrors the turns (end of section 5.2).
+        delay: [s] how much later the target follows, so that alike limbs move one after the other.
     """
 
     source: tuple[int, ...]
     target: tuple[int, ...]
     flip: bool = False
+    delay: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,9 +49,8 @@ class Mapping:
 def read_mapping(path: Path, source: Skeleton, target: Skeleton) -> Mapping:
     """Read a mapping made by hand.
 
-    The file holds ``{"pairs": [{"source": [...], "target": [...], "flip": false}, ...]}``; source
-    joints are names, target nodes are names or numbers, both from the root side outward. It is
-    what a report's ``match`` holds, so a mapping can be taken from there and edited.
+    The file holds what `mapping_from_json` takes, which is what a report's ``match`` holds: so a
+    mapping can be taken from there and edited.
 
     Raises:
         InputError: the file is not there, is not such JSON, or names what is not there.
@@ -58,8 +60,7 @@ def read_mapping(path: Path, source: Skeleton, target: Skeleton) -> Mapping:
             text = file.read(MAX_FILE + 1)
         if len(text) > MAX_FILE:
             raise InputError(f"{path} is too large for a mapping (over {MAX_FILE} bytes)")
-        pairs = _listed(parse_json(text), "pairs")
-        drives = tuple(_drive(pair, source, target) for pair in pairs)
+        mapping = mapping_from_json(parse_json(text), source, target)
     except OSError as error:
         raise InputError(f"cannot read the mapping {path}: {error.strerror or error}") from error
     except (ValueError, KeyError, TypeError, AttributeError, OverflowError) as error:
@@ -69,9 +70,22 @@ def read_mapping(path: Path, source: Skeleton, target: Skeleton) -> Mapping:
         ) from error
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
-    if not drives:
+    if not mapping.drives:
         raise InputError(f"{path} maps nothing: its `pairs` is empty")
-    return Mapping(drives)
+    return mapping
+
+
+def mapping_from_json(value: Any, source: Skeleton, target: Skeleton) -> Mapping:
+    """Return the mapping that a value out of JSON stands for; `mapping_as_json` makes such values.
+
+    It is ``{"pairs": [{"source": [...], "target": [...], "flip": false, "delay": 0.0}, ...]}``.
+    Source joints are names, target nodes are names or numbers, both from the root side outward.
+
+    Raises:
+        InputError: it names what is not there.
+        ValueError, KeyError, TypeError, AttributeError, OverflowError: it is not such a value.
+    """
+    return Mapping(tuple(_drive(pair, source, target) for pair in _listed(value, "pairs")))
 
 
 def _drive(pair: dict[str, Any], source: Skeleton, target: Skeleton) -> Drive:
@@ -82,6 +96,7 @@ def _drive(pair: dict[str, Any], source: Skeleton, target: Skeleton) -> Drive:
         source=tuple(source.index(str(name)) for name in _listed(pair, "source")),
         target=tuple(_node(node, target) for node in _listed(pair, "target")),
         flip=flip,
+        delay=_delay(pair.get("delay", 0.0)),
     )
     check_drive(drive, target)
     return drive
@@ -101,6 +116,14 @@ def check_drive(drive: Drive, target: Skeleton) -> None:
             raise InputError(
                 f"target nodes {target.names[near]} and {target.names[far]} share no bone"
             )
+
+
+def _delay(value: object) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise TypeError(f"`delay` is a number of seconds, got {value!r}")
+    if not 0.0 <= value <= MOST_DELAY:
+        raise InputError(f"`delay` is from 0 to {MOST_DELAY:g} s, got {value:g}")
+    return float(value)
 
 
 def _listed(holder: dict[str, Any], key: str) -> list[Any]:
@@ -130,6 +153,7 @@ def mapping_as_json(mapping: Mapping, source: Skeleton) -> dict[str, Any]:
                 "source": [source.names[joint] for joint in drive.source],
                 "target": [int(node) for node in drive.target],
                 "flip": drive.flip,
+                "delay": drive.delay,
             }
             for drive in mapping.drives
         ],

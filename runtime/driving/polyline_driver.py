@@ -7,7 +7,7 @@ performer's chain turns from the performer's rest state.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -34,6 +34,7 @@ from runtime.driving.targets import HandleTargets, PosedNodes, SkinnedTargets, T
 from runtime.puppet.bound_skeleton import Anchors
 from solvers.retarget.chain_retargets import ChainRetargets, ChainRetargetsState
 from solvers.retarget.polyline_motion import map_chain
+from solvers.signal.delay_line import DelayLine, DelayLineState
 
 Array = NDArray[np.float64]
 
@@ -50,6 +51,7 @@ class LinkState:
     retargets: ChainRetargetsState
     exaggeration: ExaggerationState
     limb_release: LimbReleaseState
+    delays: DelayLineState
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -84,7 +86,7 @@ class _Link:
         chains: the driven chains of the character.
         source_tips: (D,) last joint of each of the performer's chains.
         root_motion: how far the whole character goes along.
-        retargets, exaggeration, limb_release: these remember the frames before.
+        retargets, exaggeration, limb_release, delays: these remember the frames before.
     """
 
     mapping: Mapping
@@ -96,9 +98,11 @@ class _Link:
     retargets: ChainRetargets
     exaggeration: Exaggeration
     limb_release: LimbRelease
+    delays: DelayLine
 
     def reset(self) -> None:
         self.retargets.reset()
+        self.delays.reset()
         self.exaggeration.reset()
         self.limb_release.reset()
 
@@ -110,12 +114,14 @@ class _Link:
             self.retargets.snapshot(),
             self.exaggeration.snapshot(),
             self.limb_release.snapshot(),
+            self.delays.snapshot(),
         )
 
     def restore(self, state: LinkState) -> None:
         self.retargets.restore(state.retargets)
         self.exaggeration.restore(state.exaggeration)
         self.limb_release.restore(state.limb_release)
+        self.delays.restore(state.delays)
 
 
 class PolylineDriver(MappedDriver):
@@ -187,6 +193,7 @@ class PolylineDriver(MappedDriver):
             retargets=ChainRetargets(maps, [drive.source for drive in drives]),
             exaggeration=Exaggeration(lengths, height),
             limb_release=LimbRelease(len(drives)),
+            delays=DelayLine(_delays(self.mapping)),
         )
         self.gains = np.ones(len(drives))
         self._weights = chains.weights(self._link.limb_release.weights)
@@ -213,7 +220,10 @@ class PolylineDriver(MappedDriver):
         if link is None:
             return self._skeleton.at_rest
         chains = link.chains
-        placed = chains.place(link.retargets.rotations(pose.facing(link.rest.heading), self.gains))
+        turns = link.retargets.rotations(pose.facing(link.rest.heading), self.gains)
+        if self._spread:
+            turns = link.delays.follow(pose.time, turns)
+        placed = chains.place(turns)
         placement = link.root_motion.placement(pose, link.rest)
         if link.limb_release.follow(pose.time, ~pose.filled[link.source_tips]):
             self._weights = chains.weights(link.limb_release.weights)
@@ -233,6 +243,19 @@ class PolylineDriver(MappedDriver):
         thinning = 0.5 * self._surface.elasticity.volume_gain
         positions = self._skeleton.handle_positions(anchors, thinning)
         return HandleTargets(self._skeleton.handles, positions, self._weights)
+
+    def delay(self, mapping: Mapping) -> None:
+        """Go on with the same mapping but for its delays; what is remembered stays."""
+        self.mapping = mapping
+        if self._link is not None:
+            self._link = replace(self._link, mapping=mapping)
+            self._link.delays.delays = _delays(mapping)
+
+    @property
+    def _spread(self) -> bool:
+        """Whether chains may follow one after the other, so that turns are remembered."""
+        drives = self._link.mapping.drives if self._link is not None else ()
+        return any(d.delay > 0.0 for d in drives) or len({d.source for d in drives}) < len(drives)
 
     def reset(self) -> None:
         """Forget the poses before: see `Driver.reset`."""
@@ -261,6 +284,7 @@ class PolylineDriver(MappedDriver):
                 RELATIVE,
                 float(gain),
                 drive.flip,
+                drive.delay,
             )
             for drive, gain in zip(self.mapping.drives, gains, strict=True)
         ]
@@ -316,6 +340,13 @@ class SkinnedPolylineDriver(PolylineDriver):
         if self._surface.elasticity.cartoon > 0.0:
             return super()._shape(anchors, nodes)
         return self._skeleton.skinned(nodes)
+
+
+def _delays(mapping: Mapping) -> Array:
+    """The delay [s] of each driven bone, chain after chain."""
+    drives = mapping.drives
+    bones = [len(drive.target) - 1 for drive in drives]
+    return np.repeat([drive.delay for drive in drives], bones).astype(np.float64)
 
 
 def _whole(strain: Strain, volume_gain: float) -> Array:

@@ -53,6 +53,7 @@ class CharacterReport:
                     "drive": part.drive,
                     "gain": float(part.gain),
                     "flip": part.flip,
+                    "delay": part.delay,
                 }
                 for part in parts
             ],
@@ -95,7 +96,7 @@ class Report:
     The keys are ``frames``, ``dropped``, ``recording`` {frames, joints, seconds}, ``record``
     {frames, lost, fault} of the recording that the show made, or null, ``character`` {vertices,
     faces, nodes}, ``match`` {score, pairs: [{name, source: [joint names], target: [node ids],
-    target_names, drive, gain, flip}]},
+    target_names, drive, gain, flip, delay}]},
     ``stages_ms`` {poll, match, retarget, deform, render, publish, frame, settle, latency: {p50,
     p99, max}}, ``stretch`` {mean, p99}, ``watchdog`` {energy {p50, max}, stretch {p99, max},
     inverted {max, last, longest, frames}}. With several characters ``character``, ``match``,

@@ -32,7 +32,7 @@ def written(tmp_path: Path, content: object) -> Path:
 
 
 def test_a_mapping_is_read_as_it_was_written(tmp_path: Path) -> None:
-    drives = Drive((0, 1, 2), (0, 1)), Drive((1, 3), (2, 1, 0, 3), flip=True)
+    drives = Drive((0, 1, 2), (0, 1)), Drive((1, 3), (2, 1, 0, 3), flip=True, delay=0.25)
     mapping = Mapping(drives, score=1.5)
     path = written(tmp_path, mapping_as_json(mapping, SOURCE))
     read = read_mapping(path, SOURCE, TARGET)
@@ -62,6 +62,9 @@ def test_nodes_may_be_named_and_joints_skipped(tmp_path: Path) -> None:
         ({"pairs": {}}, "`pairs` is a list, got dict"),
         ({"pairs": "shoulder"}, "`pairs` is a list, got str"),
         ({"pairs": [7]}, "is not a mapping: expected"),
+        ({"pairs": [GOOD | {"delay": "late"}]}, "`delay` is a number of seconds, got 'late'"),
+        ({"pairs": [GOOD | {"delay": 9}]}, "`delay` is from 0 to 4 s, got 9"),
+        ({"pairs": [GOOD | {"delay": -0.1}]}, "`delay` is from 0 to 4 s, got -0.1"),
         ({"pairs": [["shoulder", "elbow"]]}, "is not a mapping: expected"),
         ({"pairs": [{"source": ["shoulder", "elbow"]}]}, "KeyError: 'target'"),
         ({"pairs": [{**GOOD, "source": "shoulder"}]}, "`source` is a list, got str"),

@@ -69,6 +69,7 @@ def test_the_report_has_the_keys_that_others_read(tmp_path: Path) -> None:
                     "drive": "relative",
                     "gain": 0.5,
                     "flip": True,
+                    "delay": 0.0,
                 }
             ],
         },
