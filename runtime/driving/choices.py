@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from runtime.driving.mapping import Mapping
+
 
 @dataclass(frozen=True, slots=True)
 class Choices:
@@ -27,6 +29,19 @@ class Choices:
     patience: float = 0.0
     again: float | None = None
     stray: float = math.inf
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class OwnChoice:
+    """What the user chose for one puppet, in place of what is usual.
+
+    Attributes:
+        stepped: whether matches were stepped to in place of the anatomy's choice.
+        by_hand: the mapping that the user made; None without one.
+    """
+
+    stepped: bool = False
+    by_hand: Mapping | None = None
 
 
 @dataclass(frozen=True, slots=True)

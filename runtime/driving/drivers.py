@@ -38,6 +38,21 @@ def matched_driver(pairing: Pairing) -> Driver:
     return SkinnedPolylineDriver(pairing)
 
 
+def driver_of_joints(make_driver: DriverFactory, pairing: Pairing) -> Driver:
+    """Return a new driver for a performer of whom only joints are known.
+
+    Raises:
+        InputError: the driver needs a surface of the performer, or cannot drive the character.
+    """
+    driver = make_driver(pairing)
+    if driver.needs.surface:
+        raise InputError(
+            f"the driver of {pairing.character.name} needs a surface of the performer, and "
+            "this source gives joints only: choose a driver that follows a skeleton"
+        )
+    return driver
+
+
 DRIVERS: Mapping[str, DriverFactory] = {
     "auto": best_driver,
     "relative": PolylineDriver,

@@ -6,6 +6,7 @@ through, a comfortable pose becomes the rest state, and from there the motion is
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -70,6 +71,7 @@ class MatchSession:
 
     Attributes:
         selected: the puppet that the actions on the matching are for; None for all.
+        waits: whether what is shown waits to be accepted, however still the performer keeps.
     """
 
     def __init__(
@@ -83,6 +85,7 @@ class MatchSession:
         make_driver: DriverFactory = PolylineDriver,
     ) -> None:
         self.selected: int | None = None
+        self.waits = False
         self._performer = performer
         self._view = view
         self._stray = choices.stray
@@ -128,7 +131,7 @@ class MatchSession:
         sought = self._sought
         if not sought or self._kept is None or not all(match.can_perform for match in sought):
             return None
-        patience = max(match.patience for match in sought)
+        patience = math.inf if self.waits else max(match.patience for match in sought)
         return max(patience - (self._now - self._since), 0.0)
 
     @property
@@ -254,6 +257,15 @@ class MatchSession:
         self._kept = None
         for match in self._chosen:
             match.match_again(self._view())
+
+    def choose(self, number: int, mapping: Mapping) -> None:
+        """Let a puppet, by its number in this session, follow a mapping that the user made.
+
+        Raises:
+            InputError: the puppet cannot be driven so; nothing changes then.
+        """
+        self._kept = None
+        self._matches[number].choose(mapping, self._view())
 
     def next_match(self) -> None:
         """Show the match after the one shown, and stay there; also in the midst of performing."""

@@ -231,6 +231,17 @@ class Puppet:
         return travelled
 
     @property
+    def shown(self) -> Array:
+        """(N, 3) [m] the vertices as they were shown last; overwritten two motions later."""
+        return self._standing[0]
+
+    @property
+    def places(self) -> Array:
+        """(K, 3) [m] the nodes on the stage; at rest where the driver poses none."""
+        nodes = self._targets.nodes
+        return self._stance.place((nodes or self.bound_skeleton.rest_nodes).positions)
+
+    @property
     def highlights(self) -> list[Highlight]:
         """The highlights of the driver that is proposed, or else of the one that moves it."""
         place, nodes = self._stance.place, self._targets.nodes

@@ -117,17 +117,21 @@ class StageCharacter:
         self._moving.write(self._normals.fill(vertices))
         self._box = bounding_box(vertices)
 
-    def highlight(self, chains: Sequence[ArrayLike], colours: ArrayLike) -> None:
+    def highlight(
+        self, chains: Sequence[ArrayLike], colours: ArrayLike, widths: ArrayLike = 1.0
+    ) -> None:
         """Highlight polylines inside the surface; they show through it. An empty list removes them.
 
         Args:
             chains: each (K, 3) [m], in the character's coordinates.
             colours: (C, 3) linear RGB of each chain.
+            widths: times the usual width, of all or (C,) of each chain.
 
         Raises:
             ValueError: the number of colours is not the number of chains.
         """
-        self._tubes = chain_tubes(chains, colours, self._tube_radius)
+        radii = self._tube_radius * np.asarray(widths, dtype=np.float64)
+        self._tubes = chain_tubes(chains, colours, radii)
 
     @property
     def tubes(self) -> NDArray[np.float32]:

@@ -54,8 +54,10 @@ def tubes(
     return packed
 
 
-def chain_tubes(chains: Sequence[ArrayLike], colours: ArrayLike, radius: float) -> Tubes:
+def chain_tubes(chains: Sequence[ArrayLike], colours: ArrayLike, radius: ArrayLike) -> Tubes:
     """Return glows, rods and beads, in this order, along polylines, each (K, 3).
+
+    `radius` [m] is one number, or (C,) of each chain.
 
     Raises:
         ValueError: the number of colours is not the number of chains.
@@ -70,12 +72,14 @@ def chain_tubes(chains: Sequence[ArrayLike], colours: ArrayLike, radius: float) 
     chain_of = np.repeat(np.arange(len(chains)), [len(polyline) for polyline in polylines])
     rod = np.flatnonzero(chain_of[1:] == chain_of[:-1])  # from a node to the next of its chain
     start, end, colour = nodes[rod], nodes[rod + 1], rgb[chain_of[rod]]
+    radii = np.broadcast_to(np.asarray(radius, dtype=np.float64), len(chains))[chain_of]
+    thick = radii[rod]
     pale = 0.75 * rgb[chain_of] + 0.25
     return np.concatenate(
         [
-            tubes(start, end, radius, colour, opacity=0.55, glow=GLOW_REACH),
-            tubes(start, end, radius * 0.62, colour, opacity=0.95),
-            tubes(nodes, nodes, radius * 1.25, pale),
+            tubes(start, end, thick, colour, opacity=0.55, glow=GLOW_REACH),
+            tubes(start, end, thick * 0.62, colour, opacity=0.95),
+            tubes(nodes, nodes, radii * 1.25, pale),
         ]
     )
 

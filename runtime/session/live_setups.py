@@ -114,10 +114,17 @@ class ActorSetup:
             mirrored=self._performer.mirrors,
             view=_points(match.view),  # type: ignore[arg-type]  # three rows
             pairs=tuple(
-                Pair(tuple(names[joint] for joint in drive.source), drive.target, drive.flip, gain)
+                Pair(
+                    tuple(names[joint] for joint in drive.source),
+                    drive.target,
+                    drive.flip,
+                    gain,
+                    drive.delay,
+                )
                 for drive, gain in zip(match.mapping.drives, gains, strict=True)
             ),
             matched=match.matched,
+            by_hand=match.by_hand,
         )
 
     def _unstruck(self, match: StruckMatch | None) -> MatchSetup:
@@ -138,7 +145,9 @@ class ActorSetup:
             rest = self._performer.restated(rest, mirror=True, scale=1.0)
         drives = tuple(_drive(pair, performer, skeleton) for pair in match.pairs)
         gains = tuple(pair.gain for pair in match.pairs)
-        return MatchSetup(rest, Mapping(drives), np.array(match.view), match.matched, gains)
+        return MatchSetup(
+            rest, Mapping(drives), np.array(match.view), match.matched, gains, match.by_hand
+        )
 
 
 class LiveSetups:
@@ -235,7 +244,7 @@ def _drive(pair: Pair, performer: Skeleton, character: Skeleton) -> Drive:
     if not all(0 <= node < len(character.names) for node in pair.target):
         raise InputError(f"a match drives nodes that are not there: {pair.target}")
     source = tuple(performer.index(name) for name in pair.source)
-    drive = Drive(source, pair.target, pair.flip)
+    drive = Drive(source, pair.target, pair.flip, pair.delay)
     check_drive(drive, character)
     return drive
 

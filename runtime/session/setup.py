@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from devices.errors import InputError
+from runtime.driving.mapping import MOST_DELAY
 from runtime.puppet.deformable_surface import Elasticity
 
 Point = tuple[float, float, float]
@@ -21,14 +22,18 @@ class Pair:
         target: nodes, from the trunk outward.
         flip: whether the turns are mirrored.
         gain: share of the performer's turns that is carried over, in (0, 1].
+        delay: [s] how much later it follows.
     """
 
     source: tuple[str, ...]
     target: tuple[int, ...]
     flip: bool = False
     gain: float = 1.0
+    delay: float = 0.0
 
     def __post_init__(self) -> None:
+        if not 0.0 <= self.delay <= MOST_DELAY:
+            raise InputError(f"a chain follows {self.delay:g} s later: expected 0 to {MOST_DELAY:g}")
         if not 0.0 < self.gain <= 1.0:
             raise InputError(f"a chain is driven by {self.gain:g} of the turns: expected 0 to 1")
 
@@ -46,6 +51,7 @@ class StruckMatch:
         view: row by row the rotation from the stage to the camera.
         pairs: which chains drive which; none where the anatomy of both tells that.
         matched: whether matches were stepped to in place of the anatomy's choice.
+        by_hand: whether the user made the pairs.
     """
 
     joints: tuple[str, ...]
@@ -56,6 +62,7 @@ class StruckMatch:
     view: tuple[Point, Point, Point] = FRONT
     pairs: tuple[Pair, ...] = ()
     matched: bool = False
+    by_hand: bool = False
 
     def __post_init__(self) -> None:
         if len(self.joints) != len(self.rest) or len(set(self.joints)) != len(self.joints):

@@ -6,7 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from devices.skeleton import SkeletonFrame
+from runtime.driving.mapping import Mapping
 from runtime.driving.match_session import MatchSession, MatchSessionState
+from runtime.driving.matching.puppet_match import PuppetMatch
 from runtime.driving.performer import Performer, PerformerState, Pose
 from runtime.driving.unfreeze_blend import UnfreezeBlend, UnfreezeBlendState
 from runtime.puppet.puppet import Puppet, PuppetState
@@ -120,6 +122,28 @@ class ActGroup:
         """The puppets that actions are for."""
         every = [puppet for act in self._acts for puppet in act.puppets]
         return every if self._selected is None else [every[self._selected]]
+
+    @property
+    def matches(self) -> list[PuppetMatch]:
+        """The match of each character, whichever is selected."""
+        return [match for act in self._acts for match in act.match_session.matches]
+
+    def choose(self, number: int, mapping: Mapping) -> None:
+        """Let a character, by its number, follow a mapping that the user made.
+
+        Raises:
+            InputError: the character cannot be driven so; nothing changes then.
+        """
+        for act in self._acts:
+            if number < len(act.puppets):
+                act.match_session.choose(number, mapping)
+                return
+            number -= len(act.puppets)
+
+    def wait(self, on: bool) -> None:
+        """Let nothing that is shown perform by itself while `on`."""
+        for act in self._acts:
+            act.match_session.waits = on
 
     @property
     def matching(self) -> bool:

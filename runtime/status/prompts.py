@@ -81,7 +81,7 @@ def place_of_match(status: ShowStatus, selected: int | None) -> str:
             continue
         whose = f" for {character.name}" if len(status.characters) > 1 else ""
         if candidate.rank == 0:
-            return f"mapping of a file{whose}"
+            return f"mapped by hand{whose}"
         return f"match {candidate.rank} of {candidate.count}{whose}"
     return ""
 
@@ -141,7 +141,7 @@ def _candidate(character: CharacterStatus) -> str:
     if character.candidate is None:
         return "it follows limb by limb."
     if character.candidate.rank == 0:
-        return "it follows the mapping in the file."
+        return "it follows the mapping made by hand."
     return f"match {character.candidate.rank} of {character.candidate.count} lights up."
 
 

@@ -34,6 +34,9 @@ class MappingChoice:
         puppet: what is driven.
         choices: the settings of the matching.
         by_hand: the mapping to use instead of a match, or None.
+
+    Attributes:
+        by_hand: as given; may be set.
     """
 
     def __init__(
@@ -45,7 +48,7 @@ class MappingChoice:
         by_hand: Mapping | None,
     ) -> None:
         self._performer, self._source, self._puppet = performer, source, puppet
-        self._choices, self._by_hand = choices, by_hand
+        self._choices, self.by_hand = choices, by_hand
         self._hierarchy = TargetHierarchy(puppet.bound_skeleton.tree, puppet.bound_skeleton.root)
         self._hierarchy.rank(source, STRAIGHT_ON, limit=1)  # so that no frame waits for a compiler
 
@@ -69,8 +72,8 @@ class MappingChoice:
         Raises:
             InputError: there is no match of the rank that was chosen.
         """
-        if self._by_hand is not None:
-            return self._by_hand
+        if self.by_hand is not None:
+            return self.by_hand
         pose, wanted = positions[self._performer.joints], CANDIDATES + self._choices.rank
         ranked = guard.rank(pose, view, wanted) if guard is not None else []
         if not ranked:

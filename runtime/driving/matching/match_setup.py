@@ -22,7 +22,8 @@ class MatchSetup:
         mapping: which chains drive which; without drives where the anatomy tells that.
         view: (3, 3) rotation from the stage to the camera when the rest state was taken.
         matched: whether matches were stepped to in place of the anatomy's choice.
-        gains: for each drive the share of the performer's turns that is carried over.
+        gains: for each drive the share of the performer's turns that is carried over; () for all.
+        by_hand: whether the user made the mapping, which goes before anatomy and matches.
     """
 
     rest: Rest | None
@@ -30,8 +31,11 @@ class MatchSetup:
     view: Array
     matched: bool
     gains: tuple[float, ...]
+    by_hand: bool = False
 
     def is_as(self, other: MatchSetup) -> bool:
         """Return whether the puppet moves alike: the rest state is the same one."""
-        mine = self.rest, self.mapping.drives, self.matched, self.gains
-        return mine == (other.rest, other.mapping.drives, other.matched, other.gains)
+        chosen = self.matched, self.by_hand
+        mine = self.rest, self.mapping.drives, self.gains, chosen
+        theirs = other.matched, other.by_hand
+        return mine == (other.rest, other.mapping.drives, other.gains, theirs)

@@ -10,9 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.errors import InputError
-from runtime.driving.choices import Candidate, Choices
+from runtime.driving.by_hand.choosing import has_group, spread_out
+from runtime.driving.choices import Candidate, Choices, OwnChoice
 from runtime.driving.driver import DrivenPart, Driver, MappedDriver
-from runtime.driving.drivers import DriverFactory, best_driver, matched_driver
+from runtime.driving.drivers import (
+    LIMB_BY_LIMB,
+    DriverFactory,
+    best_driver,
+    driver_of_joints,
+    matched_driver,
+)
 from runtime.driving.mapping import Mapping
 from runtime.driving.matching.hand_mapping import mapping_of_hands
 from runtime.driving.matching.mapping_choice import MappingChoice
@@ -21,7 +28,7 @@ from runtime.driving.matching.match_setup import MatchSetup
 from runtime.driving.matching.puppet_match_state import PuppetMatchState
 from runtime.driving.pairing import Pairing
 from runtime.driving.performer import Performer, Pose, Rest
-from runtime.driving.polyline_driver import STRAIGHT_ON
+from runtime.driving.polyline_driver import STRAIGHT_ON, PolylineDriver
 from runtime.driving.reach import Reach, reach_of
 from runtime.driving.turn_limits import box_of, corners_of, limit_turns
 from runtime.puppet.puppet import Puppet
@@ -65,12 +72,12 @@ class PuppetMatch:
         self.puppet = puppet
         self.rest: Rest | None = None
         self._performer = performer
-        self._choices, self._by_hand = choices, by_hand
+        self._choices = choices
+        self._given = self._own = self._drives = OwnChoice(by_hand=by_hand)
         self._clip: Sequence[Pose] = ()
         self._mapping_choice = MappingChoice(performer, source, puppet, choices, by_hand)
         self._hysteresis = MatchHysteresis(choices.rank - 1)
         self._make_usual = make_driver
-        self._matched = self._drives_matched = False
         self._of_hands = mapping_of_hands(self._pairing()) if make_driver is best_driver else None
         self.matching = True
         self._view = STRAIGHT_ON
@@ -83,17 +90,17 @@ class PuppetMatch:
     def snapshot(self) -> PuppetMatchState:
         """Return what is remembered between frames."""
         proposal = None if self._proposal is None else self._proposal.snapshot()
-        shown, matched = self._hysteresis.snapshot(), (self._matched, self._drives_matched)
-        return PuppetMatchState(self.rest, self._view, shown, self.matching, *matched, proposal)
+        shown, chosen = self._hysteresis.snapshot(), (self._own, self._drives)
+        return PuppetMatchState(self.rest, self._view, shown, self.matching, *chosen, proposal)
 
     def restore(self, state: PuppetMatchState) -> None:
         """Go back to a snapshot; the puppet's own brings the driver back."""
         self.rest, self._view, self.matching = state.rest, state.view, state.matching
         self._hysteresis.restore(state.hysteresis)
-        if self._drives_matched is not state.drives_matched:
-            self._matched = state.drives_matched
+        if self._drives is not state.drives:
+            self._choose(state.drives)
             self._drive_with(self._make(self._make_driver))
-        self._matched = state.matched
+        self._choose(state.own)
         proposal = None if state.proposal is None else self._make(self._make_driver)
         if proposal is not None:
             proposal.restore(state.proposal)
@@ -114,7 +121,7 @@ class PuppetMatch:
         """The match that is shown; None where the anatomy chooses, or no pose was struck."""
         if not isinstance(self._shown, MappedDriver) or not self.mapping.drives or self._of_anatomy:
             return None
-        rank, count = self._hysteresis.place
+        rank, count = (0, 0) if self._own.by_hand is not None else self._hysteresis.place
         return Candidate(rank, count, self.mapping.score)
 
     @property
@@ -214,7 +221,12 @@ class PuppetMatch:
         if isinstance(driver, MappedDriver) and self.rest is not None:
             mapping, gains = driver.mapping, driver.gains
         return MatchSetup(
-            self.rest, mapping, self._view, self._drives_matched, tuple(gains.tolist())
+            self.rest,
+            mapping,
+            self._view,
+            matched=self._drives.stepped,
+            gains=tuple(gains.tolist()),
+            by_hand=self._drives.by_hand is not None,
         )
 
     def set_up(self, setup: MatchSetup) -> None:
@@ -223,16 +235,41 @@ class PuppetMatch:
         Raises:
             InputError: the setup does not fit the puppet, which goes on as it is driven now.
         """
-        before, self._matched = self._matched, setup.matched
+        before = self._own
+        self._choose(OwnChoice(setup.matched, setup.mapping if setup.by_hand else None))
         driver = self._make(self._make_driver)
         try:
             self._prepare(driver, setup)
         except InputError:
-            self._matched = before
+            self._choose(before)
             raise
         self._propose(None)
         self._drive_with(driver)
         self.rest, self.matching, self._view = setup.rest, setup.rest is None, setup.view
+
+    def choose(self, mapping: Mapping, view: Array) -> None:
+        """Follow a mapping that the user made, whatever anatomy and matches say.
+
+        A puppet that performs goes on by it at once, from the same rest state, and departs from
+        what is shown now. Else the mapping waits to be accepted, as a match does.
+
+        Args:
+            mapping: which joints drive which nodes of this puppet.
+            view: (3, 3) rotation from the stage to the camera.
+
+        Raises:
+            InputError: the puppet cannot be driven so; nothing changes then.
+        """
+        self.set_up(MatchSetup(self.rest, mapping, view, matched=False, gains=(), by_hand=True))
+
+    def delay(self, phase: float) -> None:
+        """Let chains with one source follow one `phase` [s] after the other, in their order."""
+        driver = self._driver
+        if isinstance(driver, PolylineDriver) and has_group(driver.mapping):
+            driver.delay(spread_out(driver.mapping, phase))
+            if self._own is self._drives and self._own.by_hand is not None:
+                self._choose(OwnChoice(by_hand=driver.mapping))
+                self._drives = self._own
 
     def rehearse(self, clip: Sequence[Pose], states: Sequence[Rest], view: Array) -> None:
         """Let the puppet perform from that one of these rest states which is most like it.
@@ -270,12 +307,12 @@ class PuppetMatch:
         return reach_of(self._driver, self.puppet.root, around, poses)
 
     def match_again(self, view: Array) -> None:
-        """Look for a match by the pose alone, or by the anatomy, whatever was stepped to by hand.
+        """Look for a match by the pose alone, or by the anatomy, whatever was chosen by hand.
 
         A puppet that performs goes on until what is shown is accepted.
         """
         self._hysteresis.release()
-        self._matched = False
+        self._choose(self._given)
         self._look_again(view)
 
     def step(self, ranks: int, view: Array) -> None:
@@ -284,8 +321,10 @@ class PuppetMatch:
         Where the anatomy had chosen, the first step shows the best match: the user's choice beats
         both. A puppet that performs goes on until what is shown is accepted.
         """
+        if self._own.by_hand is not self._given.by_hand:
+            self._choose(self._given)
         if self._make_driver is best_driver and (self._of_anatomy or not self.mapping.drives):
-            self._matched = True
+            self._choose(replace(self._own, stepped=True))
             self._look_again(view)
             return
         self._hysteresis.cycle(ranks)
@@ -296,6 +335,7 @@ class PuppetMatch:
         """Stop looking for a match; the puppet goes on as it performs."""
         if self.rest is not None:
             self.matching = False
+            self._choose(self._drives)
             self._propose(None)
 
     def _look_again(self, view: Array) -> None:
@@ -311,11 +351,16 @@ class PuppetMatch:
 
     @property
     def _make_driver(self) -> DriverFactory:
-        return matched_driver if self._matched else self._make_usual
+        chosen = self._own.by_hand is not None and self._make_usual in LIMB_BY_LIMB
+        return matched_driver if self._own.stepped or chosen else self._make_usual
+
+    def _choose(self, own: OwnChoice) -> None:
+        """Let the next driver come of a choice of the user."""
+        self._own, self._mapping_choice.by_hand = own, own.by_hand
 
     def _drive_with(self, driver: Driver) -> None:
         """Let a driver that `_make_driver` made move the puppet."""
-        self._driver, self._drives_matched = driver, self._matched
+        self._driver, self._drives = driver, self._own
         self.puppet.drive_with(driver)
 
     def _propose(self, driver: Driver | None) -> None:
@@ -336,7 +381,8 @@ class PuppetMatch:
         if isinstance(driver, MappedDriver) and self.rest is not None and not mapping.drives:
             mapping = self._mapping_choice.of_pose(self._hysteresis, self.rest.positions, 0.0, view)
         self._prepare(driver, replace(self.setup, mapping=mapping, view=view))
-        self._make_usual, self._matched, self._view = make_driver, False, view
+        self._make_usual, self._view = make_driver, view
+        self._choose(replace(self._own, stepped=False))
         self._drive_with(driver)
 
     def _prepare(self, driver: Driver, setup: MatchSetup) -> None:
@@ -351,7 +397,7 @@ class PuppetMatch:
     @property
     def _of_anatomy(self) -> Mapping | None:
         """What hands drive, where neither the user chose a mapping nor stepped to a match."""
-        chosen = self._by_hand is not None or self._make_driver is not best_driver
+        chosen = self._own.by_hand is not None or self._make_driver is not best_driver
         return None if chosen else self._of_hands
 
     @property
@@ -367,14 +413,8 @@ class PuppetMatch:
             puppet.character,
             puppet.bound_skeleton,
             puppet.surface,
-            self._by_hand,
+            self._own.by_hand,
         )
 
     def _make(self, make_driver: DriverFactory) -> Driver:
-        driver = make_driver(self._pairing())
-        if driver.needs.surface:
-            raise InputError(
-                f"the driver of {self.puppet.character.name} needs a surface of the performer, and "
-                "this source gives joints only: choose a driver that follows a skeleton"
-            )
-        return driver
+        return driver_of_joints(make_driver, self._pairing())

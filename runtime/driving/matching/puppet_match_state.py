@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from runtime.driving.choices import OwnChoice
 from runtime.driving.performer import Rest
 from solvers.retarget.match_hysteresis import MatchHysteresisState
 
@@ -22,8 +23,7 @@ class PuppetMatchState:
         view: (3, 3) rotation from the stage to the camera when it was taken.
         hysteresis: of the match shown.
         matching: whether a match is looked for.
-        matched: whether matches were stepped to in place of the anatomy's choice.
-        drives_matched: whether the driver that moves the puppet came of that.
+        own, drives: the user's choice for the next driver, and for the one that moves the puppet.
         proposal: the state of the driver that is proposed in place of the one that moves the
             puppet; None where none is.
     """
@@ -32,6 +32,6 @@ class PuppetMatchState:
     view: Array
     hysteresis: MatchHysteresisState
     matching: bool
-    matched: bool
-    drives_matched: bool
+    own: OwnChoice
+    drives: OwnChoice
     proposal: object | None

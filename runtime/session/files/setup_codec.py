@@ -61,10 +61,12 @@ def _match_as_json(match: StruckMatch) -> Json:
                 "target": list(pair.target),
                 "flip": pair.flip,
                 "gain": pair.gain,
+                "delay": pair.delay,
             }
             for pair in match.pairs
         ],
         "matched": match.matched,
+        "by_hand": match.by_hand,
     }
 
 
@@ -79,12 +81,15 @@ def _match(fields: Json) -> StruckMatch:
         view=(first, second, third),
         pairs=tuple(map(_pair, objects(fields, "pairs"))),
         matched=flag(fields, "matched"),
+        by_hand="by_hand" in fields and flag(fields, "by_hand"),
     )
 
 
 def _pair(fields: Json) -> Pair:
     target = tuple(map(checked_whole, items(fields, "target")))
-    return Pair(_names(fields, "source"), target, flag(fields, "flip"), number(fields, "gain"))
+    delay = number(fields, "delay") if "delay" in fields else 0.0
+    source, gain = _names(fields, "source"), number(fields, "gain")
+    return Pair(source, target, flag(fields, "flip"), gain, delay)
 
 
 def _names(fields: Json, name: str) -> tuple[str, ...]:
