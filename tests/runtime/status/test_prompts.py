@@ -99,7 +99,7 @@ def test_the_place_of_a_match_says_for_whom_and_nothing_where_there_is_none() ->
     assert place_of_match(both, 1) == "match 1 of 21 for squid"
     assert place_of_match(replace(LIVE, characters=[squid]), None) == "match 1 of 21"
     by_hand = replace(squid, candidate=Candidate(0, 21, 0.8))
-    assert "file" in place_of_match(replace(LIVE, characters=[by_hand]), None)
+    assert "by hand" in place_of_match(replace(LIVE, characters=[by_hand]), None)
 
 
 def test_pauses_and_freezes_say_how_to_go_on() -> None:
