@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from runtime.driving.driver import MappedDriver
+from runtime.driving.driver import Driver, MappedDriver
 from runtime.driving.performer import Pose
 from runtime.puppet.puppet import Puppet
 from solvers.signal.histogram import Counts, count, percentile
@@ -51,10 +51,10 @@ def limit_turns(puppet: Puppet, driver: MappedDriver, poses: Sequence[Pose]) -> 
     for limb in range(len(driver.gains)):
         _spare(driver, trial, limb)
     puppet.forget()
-    return corners_of(trial.boxes)
+    return _corners_of(trial.boxes)
 
 
-def box_of(puppet: Puppet, pose: Pose) -> Array:
+def _box_of(puppet: Puppet, pose: Pose) -> Array:
     """Try a pose, and return the least and greatest corner (2, 3) [m] of the puppet in place."""
     vertices = puppet.attempt(pose).vertices
     box = np.array([vertices.min(axis=0), vertices.max(axis=0)])
@@ -62,9 +62,24 @@ def box_of(puppet: Puppet, pose: Pose) -> Array:
     return box
 
 
-def corners_of(boxes: Array) -> Array:
+def _corners_of(boxes: Array) -> Array:
     """Return the least and greatest corner (2, 3) [m] of boxes (T, 2, 3) [m]."""
     return np.array([boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)])
+
+
+def tried_out(puppet: Puppet, driver: Driver, poses: Sequence[Pose]) -> Array:
+    """Try poses, and limit the turns where chains are driven; return what the puppet fills (2, 3).
+
+    Args:
+        puppet: what is driven.
+        driver: its driver, prepared.
+        poses: at least one.
+    """
+    if isinstance(driver, MappedDriver):
+        return limit_turns(puppet, driver, poses)
+    filled = _corners_of(np.array([_box_of(puppet, pose) for pose in poses]))
+    puppet.forget()
+    return filled
 
 
 class _Trial:
@@ -112,7 +127,7 @@ class _Trial:
     def attempt(self, number: int) -> None:
         """Try one pose."""
         self._gains[number] = self._driver.gains
-        self.boxes[number] = box_of(self._puppet, self._poses[number])
+        self.boxes[number] = _box_of(self._puppet, self._poses[number])
         stretch = self._puppet.surface.stretch
         self.all_edges[number] = self.limb_edges[number] = 0
         count(stretch, _BIN, self.all_edges[number])

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from devices.errors import InputError
-from runtime.driving.mapping import MOST_DELAY
 from runtime.puppet.deformable_surface import Elasticity
+from solvers.signal.delay_line import MOST
 
 Point = tuple[float, float, float]
 RIGID = Elasticity()
@@ -32,8 +32,8 @@ class Pair:
     delay: float = 0.0
 
     def __post_init__(self) -> None:
-        if not 0.0 <= self.delay <= MOST_DELAY:
-            raise InputError(f"a chain follows {self.delay:g} s later: expected 0 to {MOST_DELAY:g}")
+        if not 0.0 <= self.delay <= MOST:
+            raise InputError(f"a chain follows {self.delay:g} s later: expected 0 to {MOST:g} s")
         if not 0.0 < self.gain <= 1.0:
             raise InputError(f"a chain is driven by {self.gain:g} of the turns: expected 0 to 1")
 

@@ -30,7 +30,7 @@ from runtime.driving.pairing import Pairing
 from runtime.driving.performer import Performer, Pose, Rest
 from runtime.driving.polyline_driver import STRAIGHT_ON, PolylineDriver
 from runtime.driving.reach import Reach, reach_of
-from runtime.driving.turn_limits import box_of, corners_of, limit_turns
+from runtime.driving.turn_limits import tried_out
 from runtime.puppet.puppet import Puppet
 from solvers.retarget.match_hysteresis import MatchHysteresis
 from solvers.retarget.source_limbs import SimplifiedSource
@@ -202,32 +202,18 @@ class PuppetMatch:
 
         A match that is proposed meanwhile stays proposed.
         """
-        driver = self._driver
-        if isinstance(driver, MappedDriver):
-            gains = driver.gains
-            driver.show(driver.mapping, view)
-            driver.prepare(self._clip, rest)
-            driver.gains = gains
-        else:
-            driver.prepare(self._clip, rest)
-        self.puppet.ease()
+        self._prepare(self._driver, replace(self.setup, rest=rest, view=view))
         self.rest, self._view = rest, view
 
     @property
     def setup(self) -> MatchSetup:
         """What drives the puppet now, whatever is proposed."""
-        driver = self._driver
+        driver, own = self._driver, self._drives
         mapping, gains = Mapping(()), np.ones(0)
         if isinstance(driver, MappedDriver) and self.rest is not None:
             mapping, gains = driver.mapping, driver.gains
-        return MatchSetup(
-            self.rest,
-            mapping,
-            self._view,
-            matched=self._drives.stepped,
-            gains=tuple(gains.tolist()),
-            by_hand=self._drives.by_hand is not None,
-        )
+        by_hand, shares = own.by_hand is not None, tuple(gains.tolist())
+        return MatchSetup(self.rest, mapping, self._view, own.stepped, shares, by_hand)
 
     def set_up(self, setup: MatchSetup) -> None:
         """Drive the puppet as it was driven with an earlier setup; what is proposed is dropped.
@@ -252,10 +238,6 @@ class PuppetMatch:
 
         A puppet that performs goes on by it at once, from the same rest state, and departs from
         what is shown now. Else the mapping waits to be accepted, as a match does.
-
-        Args:
-            mapping: which joints drive which nodes of this puppet.
-            view: (3, 3) rotation from the stage to the camera.
 
         Raises:
             InputError: the puppet cannot be driven so; nothing changes then.
@@ -290,20 +272,13 @@ class PuppetMatch:
         self.perform(rest, view)
 
     def try_out(self, tried: Sequence[Pose], poses: Sequence[Pose]) -> Reach:
-        """Limit the turns to what the surface can follow in some poses, if a mapping drives.
+        """Limit the turns to what the surface can follow, if a mapping drives.
 
         Args:
             tried: at least one pose that the surface tries.
             poses: poses of the whole way, which are placed only.
-
-        Returns:
-            The room that the puppet takes in them.
         """
-        if isinstance(self._driver, MappedDriver):
-            around = limit_turns(self.puppet, self._driver, tried)
-        else:
-            around = corners_of(np.array([box_of(self.puppet, pose) for pose in tried]))
-            self.puppet.forget()
+        around = tried_out(self.puppet, self._driver, tried)
         return reach_of(self._driver, self.puppet.root, around, poses)
 
     def match_again(self, view: Array) -> None:

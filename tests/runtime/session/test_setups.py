@@ -19,6 +19,8 @@ from replay.builtin import builtin_recording
 from replay.recording import Recording
 from runtime.characters.open_character import load_character
 from runtime.control.actions import press, set_value
+from runtime.driving.by_hand.parts import character_parts
+from runtime.driving.mapping import Drive, Mapping
 from runtime.puppet.deformable_surface import Elasticity
 from runtime.session.document import Actor, Session
 from runtime.session.files.codec import as_json, from_json
@@ -111,6 +113,41 @@ def test_an_accepted_match_is_a_step_and_comes_back(
         assert setup_of(show) == setup
         again = ticks(show, 79)[-1]  # the frame that was shown last
     assert np.abs(again - shown).max() < 1e-3 * np.ptp(shown[:, 1])
+
+
+@pytest.mark.parametrize("character", ["squid", "mannequin"])
+def test_a_mapping_made_by_hand_is_a_step_and_comes_back(tmp_path: Path, character: str) -> None:
+    path = tmp_path / "s.bunraku"
+    with open_show(path, character) as show:
+        ticks(show, 10)
+        press("accept", show.controls)
+        ticks(show, 3)
+        (match,) = show.acts[0].match_session.matches
+        usual, puppet = setup_of(show), show.acts[0].puppets[0]
+        parts = character_parts(puppet.character, puppet.bound_skeleton)
+        chains = [puppet.bound_skeleton.limb(parts.chains[one]) for one in parts.groups[0][:2]]
+        arm = show.acts[0].performer.skeleton.index("ShoulderLeft")
+        source = (arm, arm + 1, arm + 2)
+        by_hand = Mapping((Drive(source, chains[0]), Drive(source, chains[1], delay=0.2)))
+        show.controls.match_controls.choose(0, by_hand)
+        ticks(show, 3)
+        setup = setup_of(show)
+        assert setup.match is not None
+        assert setup.match.by_hand
+        assert [pair.delay for pair in setup.match.pairs] == [0.0, 0.2]
+        press("undo", show.controls)
+        ticks(show, 3)
+        assert setup_of(show) == usual
+        assert match.setup.mapping.drives != by_hand.drives
+        press("redo", show.controls)
+        ticks(show, 3)
+        assert match.setup.mapping.drives == by_hand.drives
+    with open_show(path, character) as show:
+        ticks(show, 2)
+        assert setup_of(show) == setup
+        (match,) = show.acts[0].match_session.matches
+        assert match.setup.mapping.drives == by_hand.drives
+        assert match.setup.by_hand
 
 
 def test_a_match_stepped_to_goes_before_the_anatomy_again(tmp_path: Path) -> None:
@@ -217,6 +254,7 @@ def test_setups_come_back_from_json(
         st.lists(st.integers(0, 99), max_size=3).map(tuple),
         st.booleans(),
         st.floats(1e-3, 1.0),
+        st.floats(0.0, 4.0),
     )
     match = StruckMatch(
         tuple(f"joint {k}" for k in range(joints)),
@@ -227,6 +265,7 @@ def test_setups_come_back_from_json(
         view=data.draw(st.tuples(POINTS, POINTS, POINTS)),
         pairs=tuple(data.draw(st.lists(pairs, max_size=3))),
         matched=not on,
+        by_hand=on,
     )
     for struck in (None, match):
         setup = Setup(struck, Elasticity(*surface), on)
