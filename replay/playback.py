@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Protocol, runtime_checkable
 
 from devices.stream import SkeletonStream
+from replay.recording import Recording
 
 
 class Playback(Protocol):
@@ -72,6 +73,27 @@ class Played(Protocol):
         ...
 
 
+@runtime_checkable
+class OfRecording(Playback, Protocol):
+    """A playback of a recording that is known from the first frame to the last.
+
+    Attributes:
+        recording: all of its frames.
+    """
+
+    recording: Recording
+
+    def leave_out_false_start(self) -> None:
+        """Show the first frame that belongs to the rest in place of those before it."""
+        ...
+
+
 def playback_of(stream: SkeletonStream) -> Playback | None:
     """Return the playback of a recorded stream, however it is wrapped; None for a live one."""
     return stream.playback if isinstance(stream, Played) else None
+
+
+def recording_of(stream: SkeletonStream) -> Recording | None:
+    """Return the recording that a stream plays; None where nobody knows what comes."""
+    playback = playback_of(stream)
+    return playback.recording if isinstance(playback, OfRecording) else None

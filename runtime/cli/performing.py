@@ -7,11 +7,10 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeGuard
 
 from devices.errors import InputError
 from devices.stream import SkeletonStream
-from replay.player import Player
+from replay.playback import playback_of, recording_of
 from runtime.characters.open_character import load_character
 from runtime.cli.options.show_options import show_settings
 from runtime.cli.warm import warm_up
@@ -65,7 +64,7 @@ def perform(
         with collector_paused():
             characters = [load_character(name) for name in options.character]
         unused = session is None or origin == NOBODY
-        if unused and not settings.is_noticed and not _ends(stream):
+        if unused and not settings.is_noticed and _frames_of(stream) is None:
             messages.warn(
                 "this show has no window, file or sender, and runs until Ctrl-C: nobody sees it"
             )
@@ -84,9 +83,12 @@ def perform(
     return 0
 
 
-def _ends(stream: SkeletonStream) -> TypeGuard[Player]:
-    """Whether a stream has an end."""
-    return isinstance(stream, Player) and not stream.loop
+def _frames_of(stream: SkeletonStream) -> int | None:
+    """How many frames a stream has; None where it has no end."""
+    playback, recording = playback_of(stream), recording_of(stream)
+    if recording is None or playback is None or playback.loop:
+        return None
+    return len(recording)
 
 
 def tell_kept(show: Show) -> None:
@@ -103,12 +105,11 @@ def tell_kept(show: Show) -> None:
 
 
 def _run(show: Show, stream: SkeletonStream, then: Callable[[Show], object]) -> None:
-    total = len(stream.recording) if _ends(stream) else None
     told: dict[str, object] = {}
     if show.settings.window:
         messages.announce(f"{key_hint()}; docs/remote.md lists all")
     _tell_parts(show, told)
-    with Progress("performing", total) as progress:
+    with Progress("performing", _frames_of(stream)) as progress:
 
         def advance() -> None:
             then(show)

@@ -7,8 +7,7 @@ from contextlib import ExitStack
 from typing import TYPE_CHECKING
 
 from devices.stream import SkeletonStream
-from replay.playback import playback_of
-from replay.player import Player
+from replay.playback import OfRecording, playback_of, recording_of
 from replay.recorded_stream import RecordedStream
 from replay.recording import Recording
 from runtime.characters.character import Character
@@ -99,7 +98,7 @@ class OpenedShow:
         check_characters(settings, len(characters))
         check_outputs(settings, [character.name for character in characters])
         playback = playback_of(stream)
-        if isinstance(playback, Player) and settings.match.driver != "relative":
+        if isinstance(playback, OfRecording) and settings.match.driver != "relative":
             playback.leave_out_false_start()
         self._make_driver = make_driver or driver_of(settings.match)
         if self._make_driver in LIMB_BY_LIMB and settings.match.mapping is None:
@@ -166,8 +165,7 @@ class OpenedShow:
 
     @property
     def _recording(self) -> Recording | None:
-        playback = playback_of(self._source)
-        return playback.recording if isinstance(playback, Player) else None
+        return recording_of(self._source)
 
     @property
     def _rate(self) -> float:
