@@ -42,6 +42,7 @@ EXTRAS = {
     "manifold3d",
     "mediapipe",
     "meshio",
+    "opentimelineio",
     "pxr",
     "pygel3d",
     "pyvirtualcam",

@@ -25,6 +25,7 @@ EXTRAS: dict[str, tuple[str, ...]] = {
     "video": ("av",),
     "usd": ("pxr",),
     "leap": ("websockets",),
+    "timeline": ("opentimelineio",),
     "webcam": ("mediapipe", "cv2"),
     "camera": ("pyvirtualcam",),
     "ndi": ("cyndilib",),

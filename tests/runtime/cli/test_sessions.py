@@ -184,6 +184,20 @@ def test_exports_of_layers_show_in_other_programs_what_the_program_shows(
                 assert np.linalg.norm(0.01 * places[written] - node) < 1e-4 * height
 
 
+def test_a_timeline_is_written_without_a_show(
+    saved: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("opentimelineio")
+    out = tmp_path / "a.otio"
+    assert main(["render", str(saved), "--timeline", str(out), "--rate", "25"]) == 0
+    said = capsys.readouterr()
+    assert re.search(r"a\.otio: 2 tracks, 2 clips, 0 marks, [\d.]+ kB$", said.out.strip())
+    assert json.loads(out.read_text())["OTIO_SCHEMA"].startswith("Timeline")
+    assert main(["render", str(saved)]) == 2
+    assert "--timeline or --report" in capsys.readouterr().err
+    assert main(["render", str(saved), "--timeline", str(tmp_path / "a.edl")]) == 2
+
+
 def test_a_plain_skin_can_be_chosen(
     saved: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
