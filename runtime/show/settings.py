@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 
 from devices.errors import InputError
@@ -268,8 +268,9 @@ class ShowSettings:
     @property
     def is_noticed(self) -> bool:
         """Whether anybody gets anything of the show: by a window, file, sender or remote."""
+        files = replace(self.files, export_within=None)  # which writes nothing by itself
         asked: list[object] = [
-            *(getattr(self.files, each.name) for each in fields(self.files)),
+            *(getattr(files, each.name) for each in fields(files)),
             *(getattr(self.senders, each.name) for each in fields(self.senders)),
             self.remote,
         ]
