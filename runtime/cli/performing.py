@@ -21,6 +21,7 @@ from runtime.show.collector_pauses import collector_paused
 from runtime.show.interrupts import Interrupted
 from runtime.show.outputs import check_outputs
 from runtime.show.pacing import AtOnce
+from runtime.show.settings import KioskSettings
 from runtime.show.show import Show
 from runtime.status.progress import Progress
 
@@ -35,7 +36,7 @@ def perform(
     read: Sequence[tuple[str, Path]] = (),
     session: SessionStore | None = None,
     then: Callable[[Show], object] = lambda _: None,
-    kiosk: float | None = None,
+    kiosk: KioskSettings | None = None,
 ) -> int:
     """Perform the show that the options ask for; the exit code.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
@@ -191,6 +192,28 @@ class RemoteSettings:
 
 
 @dataclass(frozen=True, slots=True)
+class KioskSettings:
+    """A show that nobody operates.
+
+    Attributes:
+        patience: [s] after the last performer has left until the session plays again and again.
+        pin: digits that an operator types to use the keys and the mouse; "" lets everybody.
+
+    Raises:
+        InputError: a value is out of range; the message names the setting.
+    """
+
+    patience: float
+    pin: str = ""
+
+    def __post_init__(self) -> None:
+        _check_range(self, "patience", 0.0, math.inf)
+        pin: object = self.pin
+        if not isinstance(pin, str) or (pin and not re.fullmatch(r"[0-9]{1,12}", pin)):
+            raise _refusal(self, "pin", "1 to 12 digits, or an empty text")
+
+
+@dataclass(frozen=True, slots=True)
 class ShowSettings:
     """Everything about a show but its stream and its characters.
 
@@ -209,8 +232,7 @@ class ShowSettings:
         files: the files to write.
         senders: what to send to other programs.
         remote: remote control by OSC, or None.
-        kiosk: [s] after the last performer has left until the session plays again and again; None
-            where somebody operates the show.
+        kiosk: of a session that nobody operates; None where somebody does.
         origin: where the stream comes from, for the head of recordings: an address or a file name.
 
     Raises:
@@ -231,12 +253,10 @@ class ShowSettings:
     files: FileSettings = field(default_factory=FileSettings)
     senders: SenderSettings = field(default_factory=SenderSettings)
     remote: RemoteSettings | None = None
-    kiosk: float | None = None
+    kiosk: KioskSettings | None = None
     origin: str = ""
 
     def __post_init__(self) -> None:
-        if self.kiosk is not None:
-            _check_range(self, "kiosk", 0.0, math.inf)
         size: object = self.size
         if not isinstance(size, tuple) or len(size) != 2 or not all(map(_is_side, size)):
             raise _refusal(self, "size", f"two whole numbers from {LEAST_SIDE} to {MOST_SIDE}")
@@ -290,6 +310,7 @@ Settings = (
     | FileSettings
     | SenderSettings
     | RemoteSettings
+    | KioskSettings
     | ShowSettings
 )
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import math
+import re
 import string
 
 from runtime.show.settings import LEAST_SIDE, MOST_SIDE, MOST_STIFFNESS, MOST_VOLUME_GAIN
@@ -50,6 +51,13 @@ def size(text: str) -> tuple[int, int]:
             f"each side must be {LEAST_SIDE} to {MOST_SIDE} pixels, got {text!r}"
         )
     return pair
+
+
+def digits(text: str) -> str:
+    """A PIN: 1 to 12 digits."""
+    if not re.fullmatch(r"[0-9]{1,12}", text):
+        raise argparse.ArgumentTypeError(f"expected 1 to 12 digits, got {text!r}")
+    return text
 
 
 def positive(text: str) -> float:

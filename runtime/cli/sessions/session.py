@@ -6,13 +6,15 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from devices.errors import InputError
 from runtime.cli.live import for_performers, is_camera
-from runtime.cli.options.arguments import Once, positive, seconds
+from runtime.cli.options.arguments import Once, digits, positive, seconds
 from runtime.cli.options.input_options import add_input_options, stated
 from runtime.cli.options.show_options import add_character_option, add_show_options
 
 if TYPE_CHECKING:
     from devices.stream import SkeletonStream
+    from runtime.show.settings import KioskSettings
     from runtime.show.show import Show
 
 HELP = "record takes in layers, play and edit them"
@@ -57,6 +59,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="nobody operates the show: it plays S seconds after the last performer has left, "
         "and stops for the next one; full screen, without the panel",
     )
+    parser.add_argument(
+        "--pin",
+        type=digits,
+        metavar="DIGITS",
+        help="with --kiosk: keys and mouse do nothing until these digits are typed",
+    )
     add_character_option(parser, required=False)
     add_input_options(parser)
     add_show_options(parser)
@@ -84,7 +92,7 @@ def run(options: argparse.Namespace) -> int:
             read=[("--recording", options.recording)] if options.recording else [],
             session=store,
             then=_Beginning(options.at, take=options.take),
-            kiosk=options.kiosk,
+            kiosk=_kiosk(options),
         )
     except BaseException:
         store.abandon()
@@ -96,6 +104,17 @@ def run(options: argparse.Namespace) -> int:
         f"{session.duration:.2f} s"
     )
     return code
+
+
+def _kiosk(options: argparse.Namespace) -> KioskSettings | None:
+    """What is asked for of a show that nobody operates."""
+    from runtime.show.settings import KioskSettings
+
+    if options.kiosk is None:
+        if options.pin:
+            raise InputError("--pin locks a kiosk: add --kiosk S")
+        return None
+    return KioskSettings(options.kiosk, options.pin or "")
 
 
 class _Beginning:

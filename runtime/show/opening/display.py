@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 from devices.skeleton import Skeleton
 from runtime.control.audience_window import AudienceWindow
 from runtime.control.keys import WindowControls
+from runtime.control.pin_lock import PinLock
 from runtime.control.show_controls import ShowControls
-from runtime.control.window import Window, leave_windows
+from runtime.control.window import InputTaker, Window, leave_windows
 from runtime.puppet.puppet import Puppet
 from runtime.render.context import headless_context, make_current, release_headless
 from runtime.show.scene import Scene
@@ -106,10 +107,17 @@ class Display:
 
         panel = Panel(self.window.context, controls, status, clock=self._clock)
         self._closing.callback(panel.close)
-        self.window.taker = panel.gui
+        self.window.taker = self._locked(panel.gui, controls)
         audience = AudienceWindow(self.window, transparent=self._settings.transparent)
         self._closing.callback(audience.close)
         return WindowControls(self.window, scene, controls, panel, audience)
+
+    def _locked(self, taker: InputTaker, controls: ShowControls) -> InputTaker:
+        """What takes the window's input, behind a lock where there is a PIN."""
+        kiosk = self._settings.kiosk
+        if kiosk is None or not kiosk.pin:
+            return taker
+        return PinLock(taker, kiosk.pin, clock=self._clock, tell=controls.notices.show)
 
     def _open_window(self) -> Window | None:
         settings = self._settings

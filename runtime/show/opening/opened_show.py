@@ -290,7 +290,7 @@ class OpenedShow:
         )
         self.loop.goes_on = lambda: session.goes_on
         if self._settings.kiosk is not None:
-            session.kiosk = Kiosk(session.transport, self._settings.kiosk)
+            session.kiosk = Kiosk(session.transport, self._settings.kiosk.patience)
         return session
 
     def status(self) -> ShowStatus:

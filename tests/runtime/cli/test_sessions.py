@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -260,3 +261,14 @@ def test_a_kiosk_plays_the_session_while_nobody_is_there(saved: Path, tmp_path: 
         moved.append(float(np.ptp(read_pc2(cache)[1], axis=0).max()))
     assert moved[0] == 0.0
     assert moved[1] > 0.05
+
+
+@pytest.mark.parametrize(
+    ("given", "message"), [(["--pin", "1234"], "add --kiosk"), (["--pin", "12a"], "digits")]
+)
+def test_a_pin_locks_a_kiosk_only(
+    saved: Path, given: list[str], message: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with suppress(SystemExit):
+        assert main(["session", str(saved), "--headless", *given]) == 2
+    assert message in capsys.readouterr().err

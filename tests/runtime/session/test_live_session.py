@@ -20,7 +20,7 @@ from runtime.session import edits
 from runtime.session.files.store import SessionStore
 from runtime.session.transport import Mode
 from runtime.show.open_stream import play
-from runtime.show.settings import MatchSettings, ShowSettings
+from runtime.show.settings import KioskSettings, MatchSettings, ShowSettings
 from runtime.show.show import Show
 
 
@@ -192,7 +192,7 @@ def test_a_kiosk_plays_while_nobody_is_there(tmp_path: Path) -> None:
     )
     modes = []
     stream = play(seen, every_frame=True, loop=True)
-    settings = ShowSettings(kiosk=0.5)
+    settings = ShowSettings(kiosk=KioskSettings(0.5))
     characters = [load_character("mannequin")]
     with Show(stream, characters, settings, session=SessionStore(path)) as show:
         session = show.controls.session
