@@ -48,6 +48,7 @@ from solvers.skeleton.layers import LayeredNodes, LayerFrame
 from solvers.skeleton.tree import Tree
 from solvers.squash_stretch import SquashStretchSolver
 from solvers.surface.heat_weights import skin_of_heat
+from solvers.surface.ray_hit import ray_hit
 
 # What the two lists are of; after a change in this module they are made again.
 _THIS = hashlib.sha256(Path(__file__).read_bytes()).hexdigest()[:8]
@@ -151,6 +152,7 @@ def use_solvers() -> None:
     lift_segments(x[:2], unturned, link, joints, 0.5, aside, unturned)  # where wings hang only
     _stack_layers(Tree(np.array([-1, 0]), x[:2]))
     _pose_part(x[:2])
+    ray_hit(x, faces, (0.5, 0.5, 1.0), (0.0, 0.0, -1.0))  # where something is clicked on
 
 
 def _stack_layers(tree: Tree) -> None:

@@ -10,6 +10,7 @@ from collections.abc import Mapping
 
 from runtime.conditioning.switches import STEPS, SWITCHES
 from runtime.control.action import Action, Kind, switch
+from runtime.control.by_hand.choosing_actions import CHOOSING_ACTIONS
 from runtime.control.session_actions import SESSION_ACTIONS
 from runtime.control.show_controls import ShowControls
 from runtime.control.sliders import SLIDERS, STEP, Slider
@@ -75,6 +76,9 @@ def _is_matching(controls: ShowControls) -> bool:
 
 
 def _accept(controls: ShowControls) -> None:
+    if controls.chooser.on:
+        controls.chooser.accept()
+        return
     if not _is_matching(controls):
         controls.notices.show("no match is looked for: m looks for one")
         return
@@ -144,6 +148,12 @@ def _audience(controls: ShowControls, on: bool) -> None:
     controls.view.audience = on
 
 
+def _keep(controls: ShowControls) -> None:
+    if controls.chooser.on:
+        controls.chooser.leave()
+    controls.match_controls.keep()
+
+
 def _front(controls: ShowControls) -> None:
     if controls.scene is not None:
         controls.scene.view_from_front()
@@ -159,7 +169,14 @@ def _select(controls: ShowControls) -> None:
 
 
 def _leave(controls: ShowControls) -> None:
-    """Leave; while something is recorded, only when asked twice."""
+    """Leave; while something is recorded, only when asked twice.
+
+    While pairs are chosen by hand, leave only that.
+    """
+    if controls.chooser.on:
+        controls.chooser.leave()
+        controls.notices.show("what drove goes on")
+        return
     running = controls.takes.running
     if running and not controls.leave_asked.again():
         names = ", ".join(take.path.name for take in running)
@@ -263,7 +280,7 @@ ACTIONS: Mapping[str, Action] = {
     "keep-match": Action(
         "Go on as before",
         "look for no match any more",
-        press=lambda controls: controls.match_controls.keep(),
+        press=_keep,
         words=lambda _: "going on as before",
     ),
     "front": Action(
@@ -326,6 +343,7 @@ ACTIONS: Mapping[str, Action] = {
         for name, action in _slider_actions(slider_name, slider).items()
     },
     **{name: _conditioning(name, *STEPS[name]) for name in SWITCHES},
+    **CHOOSING_ACTIONS,
     **SESSION_ACTIONS,
     "leave": Action("Leave", "end the show", press=_leave, words=lambda _: "leaving"),
 }

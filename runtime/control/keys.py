@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 from runtime.control.action import Kind
 from runtime.control.actions import ACTIONS, press
 from runtime.control.show_controls import ShowControls
-from runtime.control.window import Event, KeyPressed, Resized, Window
+from runtime.control.window import Clicked, Event, Pointed, Resized, Window
 from runtime.render.stage import Stage
 from runtime.show.scene import Scene
 
@@ -61,6 +61,12 @@ KEYS = {
     "f2": "save",
     "f3": "loop",
     "f4": "half-speed",
+    "f6": "map-by-hand",
+    "f7": "widest-view",
+    "f8": "together",
+    "end": "clear-pairs",
+    "-": "phase-down",
+    "=": "phase-up",
     "escape": "leave",
 }
 """The action of each key."""
@@ -138,6 +144,7 @@ class WindowControls:
             self._scene.camera = self._window.camera
         for event in events:
             self._handle(event)
+        self._controls.chooser.look()
         self._camera = self._window.camera = self._scene.camera
         self._controls.leaving = self._controls.leaving or self._window.should_close
         if self._window.full_screen is not self._controls.view.full_screen:
@@ -169,7 +176,11 @@ class WindowControls:
     def _handle(self, event: Event) -> None:
         if isinstance(event, Resized):
             self._scene.stage.resize(event.size)
-        elif isinstance(event, KeyPressed) and event.key in KEYS:
+        elif isinstance(event, Pointed):
+            self._controls.chooser.point(event.at)
+        elif isinstance(event, Clicked):
+            self._controls.chooser.click(event.at)
+        elif event.key in KEYS:
             name = KEYS[event.key]
             if not (event.again and ACTIONS[name].kind is Kind.SWITCH):  # by a key held down
                 press(name, self._controls)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from replay.playback import Playback
 from runtime.conditioning.switches import Conditioning
+from runtime.control.by_hand.chooser import Chooser
 from runtime.puppet.puppet import Puppet
 from runtime.session.live_session import LiveSession
 from runtime.show.act_group import ActGroup
@@ -46,6 +47,7 @@ class ShowControls:
         puppets: all characters as they are driven.
         takes: the recorder of takes.
         notices: what happened last.
+        chooser: lets pairs be chosen by hand.
         playback: the playback of a recording; None where the stream is live.
         session: the session that is open; None for none.
         scene: the picture; None where no picture is drawn.
@@ -60,6 +62,7 @@ class ShowControls:
     puppets: Sequence[Puppet]
     takes: Takes
     notices: Notices
+    chooser: Chooser
     leave_asked: SecondPress
     playback: Playback | None = None
     session: LiveSession | None = None

@@ -15,6 +15,7 @@ from runtime.render.camera import Camera, front_camera
 from runtime.render.context import current_context, leave_headless
 
 ORBIT_SPEED = 0.006  # rad a pixel
+CLICK = 4.0  # px that the mouse may move between press and release of a click
 ZOOM_STEP = 1.12  # a notch of the wheel
 
 
@@ -50,7 +51,21 @@ class Resized:
     size: tuple[int, int]
 
 
-Event = KeyPressed | Resized
+@dataclass(frozen=True, slots=True)
+class Pointed:
+    """The mouse has moved to a place of the framebuffer [px] from the upper left corner."""
+
+    at: tuple[float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Clicked:
+    """The left button was pressed and let go at a place, as of `Pointed`."""
+
+    at: tuple[float, float]
+
+
+Event = KeyPressed | Resized | Pointed | Clicked
 
 
 class InputTaker(Protocol):
@@ -142,6 +157,7 @@ class Window:
         self._events: list[Event] = []
         self._cursor = glfw.get_cursor_pos(self.handle)
         self._dragging: int | None = None
+        self._pressed_at: tuple[float, float] | None = None
         glfw.swap_interval(1)
         glfw.set_key_callback(self.handle, self.on_key)
         glfw.set_char_callback(self.handle, self._on_letter)
@@ -246,18 +262,25 @@ class Window:
         if self.taker is not None and self.taker.button(button, down=down):
             return
         if not down:
-            self._dragging = None
-        else:
-            shifted = button == glfw.MOUSE_BUTTON_LEFT and mods & glfw.MOD_SHIFT
-            self._dragging = glfw.MOUSE_BUTTON_MIDDLE if shifted else button
+            self._dragging, pressed_at, self._pressed_at = None, self._pressed_at, None
+            if pressed_at is not None and button == glfw.MOUSE_BUTTON_LEFT:
+                self._events.append(Clicked(self._in_pixels(*pressed_at)))
+            return
+        shifted = button == glfw.MOUSE_BUTTON_LEFT and mods & glfw.MOD_SHIFT
+        self._dragging = glfw.MOUSE_BUTTON_MIDDLE if shifted else button
+        self._pressed_at = self._cursor if button == glfw.MOUSE_BUTTON_LEFT else None
 
     def _on_cursor(self, _: object, x: float, y: float) -> None:
         right, down = x - self._cursor[0], y - self._cursor[1]
         self._cursor = (x, y)
-        if self.taker is not None:
-            dense = self.size[0] / max(glfw.get_window_size(self.handle)[0], 1)
-            if self.taker.cursor(dense * x, dense * y):
-                return
+        if self._pressed_at is not None and (
+            abs(x - self._pressed_at[0]) > CLICK or abs(y - self._pressed_at[1]) > CLICK
+        ):
+            self._pressed_at = None
+        place = self._in_pixels(x, y)
+        if self.taker is not None and self.taker.cursor(*place):
+            return
+        self._events.append(Pointed(place))
         if self._dragging is None:
             return
         if self._dragging == glfw.MOUSE_BUTTON_LEFT:
@@ -265,6 +288,11 @@ class Window:
         else:
             height = max(glfw.get_window_size(self.handle)[1], 1)
             self.camera = self.camera.pan(-right / height, down / height)
+
+    def _in_pixels(self, x: float, y: float) -> tuple[float, float]:
+        """A place of the window in pixels of its framebuffer."""
+        dense = self.size[0] / max(glfw.get_window_size(self.handle)[0], 1)
+        return dense * x, dense * y
 
     def _on_scroll(self, _: object, right: float, up: float) -> None:
         if self.taker is None or not self.taker.scroll(right, up):

@@ -258,14 +258,17 @@ class MatchSession:
         for match in self._chosen:
             match.match_again(self._view())
 
-    def choose(self, number: int, mapping: Mapping) -> None:
-        """Let a puppet, by its number in this session, follow a mapping that the user made.
+    def choose(self, number: int, mapping: Mapping | None) -> None:
+        """Let a puppet, by its number here, follow a mapping made by hand; None to match it again.
 
         Raises:
             InputError: the puppet cannot be driven so; nothing changes then.
         """
         self._kept = None
-        self._matches[number].choose(mapping, self._view())
+        if mapping is None:
+            self._matches[number].match_again(self._view())
+        else:
+            self._matches[number].choose(mapping, self._view())
 
     def next_match(self) -> None:
         """Show the match after the one shown, and stay there; also in the midst of performing."""

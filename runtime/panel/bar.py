@@ -20,6 +20,7 @@ ICONS = {
     "freeze": icons.ICON_FA_SNOWFLAKE,
     "blackout": icons.ICON_FA_MOON,
     "match-again": icons.ICON_FA_PERSON_RAYS,
+    "map-by-hand": icons.ICON_FA_HAND_POINTER,
     "previous-match": icons.ICON_FA_CHEVRON_LEFT,
     "next-match": icons.ICON_FA_CHEVRON_RIGHT,
     "accept": icons.ICON_FA_CHECK,
@@ -32,7 +33,7 @@ ICONS = {
 }
 ICONS_ALONE = ("home", "previous-match", "next-match")
 OF_WINDOW = ("sliders", "audience", "full-screen", "panel", "help")
-QUIET = ("full-screen", "audience", "panel")
+QUIET = ("full-screen", "audience", "panel", "map-by-hand")
 """The buttons that give up their words, one after another, before the bar takes a second row."""
 TIME = 120.0  # [px] width of the line of time in a picture of the usual height
 PLACE = "place of the match"
@@ -59,7 +60,10 @@ class _Bar:
         if status.matching:
             going_on = any(each.performing for each in status.characters if each.matching)
             matching += ["accept", "keep-match"] if going_on else ["accept"]
-        groups = [playing, ["record", "freeze", "blackout", "match-again"], matching]
+        usual = ["record", "freeze", "blackout", "match-again", "map-by-hand"]
+        if controls.chooser.on:  # which has a card of its own
+            usual, matching = usual[:3], []
+        groups = [playing, usual, matching]
         self._groups = [group for group in groups if group]
         self._gap = float(imgui.get_style().item_spacing.x)
         self._silent: set[str] = set(ICONS_ALONE)

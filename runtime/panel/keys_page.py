@@ -24,6 +24,14 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "rest-pose",
         "calibrate",
     ),
+    "Mapping by hand": (
+        "map-by-hand",
+        "together",
+        "phase-up",
+        "phase-down",
+        "widest-view",
+        "clear-pairs",
+    ),
     "Playing": ("hold", "home", "loop", "freeze", "select", "leave"),
     "Recording": (
         "record",

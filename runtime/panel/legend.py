@@ -10,6 +10,7 @@ from runtime.control.show_controls import ShowControls
 from runtime.driving.driver import ABSOLUTE, RELATIVE, DrivenPart
 from runtime.panel.widgets import SMALL, Colour, card, dot, fitted, letters
 from runtime.render.tubes import PAIR_COLOURS
+from runtime.show.lights import colour_numbers
 from runtime.status.show_status import CharacterStatus, ShowStatus
 
 WIDTH = 262.0  # [px] in a picture of the usual height
@@ -60,9 +61,10 @@ def _draw_parts(character: CharacterStatus, scale: float) -> None:
     imgui.indent()
     with letters(SMALL):
         imgui.text_disabled(_way(character.parts))
+    colours = colour_numbers([part.source for part in character.parts])
     for number, part in enumerate(character.parts):
         imgui.begin_group()
-        dot(_encoded(number), 5.0 * scale)
+        dot(_encoded(colours[number]), 5.0 * scale)
         _draw_pair(part, scale)
         imgui.end_group()
         if imgui.is_item_hovered():

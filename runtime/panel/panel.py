@@ -12,6 +12,7 @@ from imgui_bundle import imgui
 from runtime.control.ramp import Ramp
 from runtime.control.show_controls import ShowControls
 from runtime.panel.bar import draw_bar
+from runtime.panel.choosing_card import draw_choosing
 from runtime.panel.gui import Gui
 from runtime.panel.keys_page import draw_keys
 from runtime.panel.legend import WIDTH as LEGEND
@@ -100,6 +101,8 @@ class Panel:
         above = draw_bar(status, controls, margin, scale)
         if controls.session is not None:
             above += self._timeline.draw(controls, margin, above - margin, scale)
+        if controls.chooser.on:
+            above += draw_choosing(controls, margin, above - margin, scale)
         draw_legend(status, controls, margin, scale, inset, above)
         if sliders:
             draw_sliders(controls, margin, scale, margin if beside else below + margin, above)

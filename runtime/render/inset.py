@@ -61,6 +61,7 @@ class SkeletonInset:
         self._upward = _leaves_first(self.parents)
         self._centre: NDArray[np.float64] | None = None
         self._half = 0.0
+        self._places = np.full((len(self.parents), 2), np.nan)
         self._capsules: Tubes = np.empty((0, 13), dtype=np.float32)
 
     def update(
@@ -81,6 +82,7 @@ class SkeletonInset:
         """
         seen = positions if view_rotation is None else positions @ view_rotation.T
         known = np.asarray(np.isfinite(seen).all(axis=1), dtype=np.bool) & self._shown
+        self._places = np.full((len(self.parents), 2), np.nan)
         if not known.any():
             self._capsules = np.empty((0, 13), dtype=np.float32)
             return
@@ -89,6 +91,7 @@ class SkeletonInset:
         painted = np.full((count, 3), np.nan) if colours is None else colours
         faint: NDArray[np.bool] = np.zeros(count, dtype=np.bool) if dimmed is None else dimmed
         placed = (seen - [*centre, 0.0]) / self._half
+        self._places[known] = FILL * placed[known, :2]
         self._capsules = _skeleton_tubes(placed, self.parents, painted, faint, known)
 
     def _longest(self, seen: NDArray[np.float64], known: NDArray[np.bool]) -> float:
@@ -117,6 +120,14 @@ class SkeletonInset:
         centre: NDArray[np.float64] = np.clip(self._centre, middle - slack, middle + slack)
         self._centre = centre
         return centre
+
+    @property
+    def places(self) -> NDArray[np.float64]:
+        """(J, 2) where the joints are drawn, right and up from the centre, in radii of the inset.
+
+        NaN where none is drawn.
+        """
+        return self._places
 
     @property
     def capsules(self) -> Tubes:
@@ -174,6 +185,12 @@ def _skeleton_tubes(
 def inset_side(size: tuple[int, int]) -> float:
     """The side [px] of the square in the upper left of a picture of `size` that the inset takes."""
     return 2.32 * max(round(0.165 * min(size)), 8)
+
+
+def inset_circle(size: tuple[int, int]) -> tuple[tuple[float, float], float]:
+    """The inset's centre [px] from the upper left corner of a picture of `size`, and its radius."""
+    side = inset_side(size)
+    return (side / 2.0, side / 2.0), side / 2.32
 
 
 class InsetPainter:

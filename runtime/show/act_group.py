@@ -128,8 +128,8 @@ class ActGroup:
         """The match of each character, whichever is selected."""
         return [match for act in self._acts for match in act.match_session.matches]
 
-    def choose(self, number: int, mapping: Mapping) -> None:
-        """Let a character, by its number, follow a mapping that the user made.
+    def choose(self, number: int, mapping: Mapping | None) -> None:
+        """Let a character, by its number, follow a mapping made by hand; None to match it again.
 
         Raises:
             InputError: the character cannot be driven so; nothing changes then.

@@ -93,12 +93,16 @@ class PictureSchedule:
             screen.show(picture)
 
     def _read(self, scene: Scene, draw: Callable[[], None]) -> Picture:
-        """Draw what outputs see: no panel takes room from it. Then draw again for the window."""
-        taken, scene.taken = scene.taken, NOTHING_TAKEN
+        """Draw what outputs see: neither room for a panel nor what can be clicked.
+
+        Then draw again for the window.
+        """
+        taken, lights = scene.taken, scene.lights
+        scene.taken, scene.lights = NOTHING_TAKEN, None
         draw()
         picture = scene.picture()
         self._taken_at = self._clock()
-        scene.taken = taken
-        if taken != NOTHING_TAKEN:
+        scene.taken, scene.lights = taken, lights
+        if taken != NOTHING_TAKEN or lights is not None:
             scene.redraw()
         return picture

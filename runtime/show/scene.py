@@ -18,12 +18,19 @@ from runtime.driving.performer import Pose
 from runtime.driving.reach import Reach
 from runtime.puppet.puppet import Motion, Puppet
 from runtime.render.background import Background
-from runtime.render.camera import Camera, front_camera
+from runtime.render.camera import (
+    DEFAULT_PITCH,
+    HIGHEST_PITCH,
+    LOWEST_PITCH,
+    Camera,
+    front_camera,
+)
 from runtime.render.frame import StageSet, stage_set
 from runtime.render.glide import SLACK, Glide, GlideState
-from runtime.render.inset import SkeletonInset, body_bones, inset_side
+from runtime.render.inset import SkeletonInset, body_bones, inset_circle, inset_side
 from runtime.render.stage import Stage
-from runtime.render.tubes import PAIR_COLOURS
+from runtime.show.lights import Lights, pair_colours
+from solvers.skeleton.widest_view import bones_of, shown_length, widest_view
 
 if TYPE_CHECKING:
     import moderngl
@@ -56,6 +63,8 @@ class Scene:
         highlights: whether the drivers' highlights are drawn.
         focus: the number of the puppet whose colours the inset's performer has.
         blackout: 0 for light, 1 for black.
+        lights: what lights up in place of the drivers' highlights; None for these.
+        seen_by: the camera of the newest picture.
         taken: shares of the picture at its left, right, top and bottom that something lies over,
             as a panel does in a window: all that is framed is drawn clear of them.
     """
@@ -88,10 +97,12 @@ class Scene:
         self._inset = None if plain else SkeletonInset(*body_bones(performer))
         self.highlights = not plain
         self.focus = 0
-        self.camera = front_camera()
+        self.camera = self.seen_by = front_camera()
+        self.lights: Lights | None = None
         self.taken = NOTHING_TAKEN
         self._pose: Pose | None = None
         self._close_up: Camera | None = None
+        self._widest_views: dict[int | None, tuple[float, float]] = {}
         self._rest = self.stage.boxes
         self._reaches: Sequence[Reach] | None = None
         self._glide = Glide(len(puppets))
@@ -138,6 +149,33 @@ class Scene:
         self.camera = front_camera()
         self.frame_all()
 
+    def view_widest(self, number: int | None) -> None:
+        """Look from where the most bone length is seen, of one puppet or of all (None)."""
+        azimuth, pitch = self._widest(number)
+        self.camera = front_camera().orbit(azimuth, pitch - DEFAULT_PITCH)
+        self.frame_all()
+
+    def shown_share(self, number: int | None) -> float:
+        """Return how much bone length is seen now, as a share of what the widest view shows."""
+        azimuth, pitch = self._widest(number)
+        widest = front_camera().orbit(azimuth, pitch - DEFAULT_PITCH)
+        toward = np.array([each.view_rotation[2] for each in (self.camera, widest)])
+        now, most = shown_length(self._bones(number), toward).tolist()
+        return float(now / max(most, 1e-9))
+
+    def _widest(self, number: int | None) -> tuple[float, float]:
+        """Azimuth and pitch [rad] of the widest view, found once."""
+        if number not in self._widest_views:
+            self._widest_views[number] = widest_view(
+                self._bones(number), DEFAULT_PITCH, LOWEST_PITCH, HIGHEST_PITCH
+            )
+        return self._widest_views[number]
+
+    def _bones(self, number: int | None) -> NDArray[np.float64]:
+        """The bones (B, 3) [m] at rest of one puppet, or of all."""
+        puppets = self._puppets if number is None else [self._puppets[number]]
+        return np.concatenate([bones_of(puppet.bound_skeleton.tree) for puppet in puppets])
+
     def _framed(self, boxes: NDArray[np.float64]) -> Camera:
         """The camera, moved so that boxes (A, 2, 3) [m] fill the picture."""
         return self.camera.frame(boxes, self.stage.aspect, margin=MARGIN)
@@ -177,20 +215,23 @@ class Scene:
 
     def draw_for_audience(self) -> None:
         """Draw once more what was drawn last: whole, without highlights and without the inset."""
-        kept = self.taken, self.highlights, self._inset
-        self.taken, self.highlights, self._inset = NOTHING_TAKEN, False, None
+        kept = self.taken, self.highlights, self.lights, self._inset, self.seen_by
+        self.taken, self.highlights, self.lights, self._inset = NOTHING_TAKEN, False, None, None
         self.redraw()
-        self.taken, self.highlights, self._inset = kept
+        self.taken, self.highlights, self.lights, self._inset, self.seen_by = kept
 
     def draw(self, pose: Pose | None) -> None:
         """Draw the uploaded puppets with their highlights, and the performer in the inset."""
         self._pose = pose
         highlights = [puppet.highlights for puppet in self._puppets]
-        for character, own in zip(self._characters, highlights, strict=True):
-            lit = own if self.highlights else []
-            character.highlight([each.points for each in lit], _colours(len(lit)))
+        for number, own in enumerate(highlights):
+            self._light_up(number, own if self.highlights else [])
         if self._inset is not None and pose is not None:
-            colours = _joint_colours(len(pose.seen), highlights[self.focus])
+            joints = len(pose.seen)
+            if self.lights is not None:
+                colours = self.lights.joint_colours(joints)
+            else:
+                colours = _joint_colours(joints, highlights[self.focus])
             self._inset.update(
                 pose.seen,
                 colours=colours,
@@ -204,7 +245,40 @@ class Scene:
         camera = self._gliding_camera()
         if self.taken != NOTHING_TAKEN:
             camera = camera.clear_of(*self.taken, filled=self._filled)
+        self.seen_by = camera
         self.stage.draw(camera, inset, self._stage_set())
+
+    def _light_up(self, number: int, highlights: Sequence[Highlight]) -> None:
+        """Light up chains of a puppet: its driver's, unless others are to be seen."""
+        if self.lights is None:
+            chains = [each.points for each in highlights]
+            self._characters[number].highlight(
+                chains, pair_colours([each.joints for each in highlights])
+            )
+            return
+        lit = self.lights.chains(number)
+        self._characters[number].highlight(
+            [each.points for each in lit],
+            np.array([each.colour for each in lit]),
+            np.array([each.width for each in lit]),
+        )
+
+    def position(self, number: int) -> NDArray[np.float64]:
+        """Return where a puppet's origin is on the stage (3,) [m], by its number."""
+        return self._characters[number].position
+
+    @property
+    def inset_circle(self) -> tuple[tuple[float, float], float]:
+        """The inset's centre [px] from the upper left corner, and its radius [px]; 0 for none."""
+        return inset_circle(self.stage.size) if self._inset is not None else ((0.0, 0.0), 0.0)
+
+    @property
+    def performer_on_screen(self) -> NDArray[np.float64] | None:
+        """(J, 2) [px] the joints in the inset, NaN where none is drawn; None without an inset."""
+        if self._inset is None or self._pose is None:
+            return None
+        (x, y), radius = self.inset_circle
+        return self._inset.places * (radius, -radius) + (x, y)
 
     @property
     def inset_side(self) -> float:
@@ -274,14 +348,10 @@ def _side_of(puppet: Puppet) -> NDArray[np.float64] | None:
     return np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
 
 
-def _colours(count: int) -> NDArray[np.float64]:
-    """Linear RGB (C, 3) of `count` highlights, in order."""
-    return PAIR_COLOURS[np.arange(count) % len(PAIR_COLOURS)]
-
-
 def _joint_colours(joints: int, highlights: Sequence[Highlight]) -> NDArray[np.float64]:
     """Linear RGB of each joint (J, 3): the colour of its highlight; NaN where it has none."""
     colours = np.full((joints, 3), np.nan)
-    for highlight, colour in zip(highlights, _colours(len(highlights)), strict=True):
+    of_pairs = pair_colours([each.joints for each in highlights])
+    for highlight, colour in zip(highlights, of_pairs, strict=True):
         colours[list(highlight.joints)] = colour
     return colours

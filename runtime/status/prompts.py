@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from runtime.session.transport import Mode
+from runtime.status.choosing_words import choosing_advice, choosing_headline
 from runtime.status.session_words import session_advice, session_headline
 from runtime.status.show_status import CharacterStatus, PerformerStatus, ShowStatus
 from runtime.status.stream_watch import Sight, Sighting
@@ -12,6 +13,8 @@ from runtime.status.stream_watch import Sight, Sighting
 
 def headline(status: ShowStatus) -> str:
     """What is seen of the performer, to be read from two metres away."""
+    if status.choosing is not None:
+        return choosing_headline(status.choosing)
     if status.session is not None and (words := session_headline(status.session)):
         return words
     sighting = status.sighting
@@ -47,6 +50,12 @@ def details(status: ShowStatus) -> str:
 
 def advice(status: ShowStatus) -> str:
     """What to do next, in one or two sentences."""
+    if status.choosing is not None:
+        return choosing_advice(status.choosing)
+    return _advice_on_show(status)
+
+
+def _advice_on_show(status: ShowStatus) -> str:
     if status.session is not None and status.session.mode is not Mode.REHEARSING:
         return session_advice(status.session)
     if is_paused(status):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Protocol
 
 from replay.playback import Playback
 from runtime.driving.choices import Candidate
@@ -13,6 +14,7 @@ from runtime.session.live_session import LiveSession
 from runtime.show.act_group import Act
 from runtime.show.loop import FrameLoop
 from runtime.show.takes import RunningTake, Takes
+from runtime.status.choosing_words import ChoosingStatus
 from runtime.status.session_words import SessionStatus, session_status
 from runtime.status.stream_watch import Sighting, StreamWatch
 
@@ -82,6 +84,7 @@ class ShowStatus:
         frames: performed so far.
         session: of the session that is open; None for none.
         performers: who is in view, or was.
+        choosing: how far choosing by hand is; None while nothing is chosen.
     """
 
     origin: str
@@ -93,11 +96,25 @@ class ShowStatus:
     frames: int
     session: SessionStatus | None = None
     performers: Sequence[PerformerStatus] = ()
+    choosing: ChoosingStatus | None = None
 
     @property
     def matching(self) -> bool:
         """Whether a match is looked for, for any character."""
         return any(character.matching for character in self.characters)
+
+
+class Choosing(Protocol):
+    """Pairs that are chosen by hand."""
+
+    @property
+    def status(self) -> ChoosingStatus | None:
+        """How far it is; None while nothing is chosen."""
+        ...
+
+    def chosen(self, number: int) -> Sequence[DrivenPart]:
+        """Return the pairs of a character in words."""
+        ...
 
 
 def status_of(
@@ -108,12 +125,19 @@ def status_of(
     takes: Takes,
     playback: Playback | None,
     session: LiveSession | None,
+    chooser: Choosing,
 ) -> ShowStatus:
     """Return the state of a show as it is now, out of its parts."""
+    characters = [status for act in acts for status in _characters(act)]
+    if (choosing := chooser.status) is not None:
+        characters = [
+            replace(character, parts=chooser.chosen(number))
+            for number, character in enumerate(characters)
+        ]
     return ShowStatus(
         origin=origin,
         sighting=watch.look(),
-        characters=[status for act in acts for status in _characters(act)],
+        characters=characters,
         recording=takes.running,
         playback=None
         if playback is None
@@ -122,6 +146,7 @@ def status_of(
         frames=loop.frames,
         session=None if session is None else session_status(session),
         performers=[_performer(act, act.pose) for act in acts if act.pose is not None],
+        choosing=choosing,
     )
 
 

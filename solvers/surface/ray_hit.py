@@ -36,7 +36,7 @@ def ray_hit(
 
     Both sides of a triangle count, so a surface with holes is hit from within, too. Triangles
     without area, and with corners that are not finite, are never hit. Every triangle is looked at:
-    20,000 of them take 0.1 ms, less than any structure that would have to follow a deforming
+    20,000 of them take 0.3 ms, less than any structure that would have to follow a deforming
     surface.
 
     Args:
@@ -75,18 +75,18 @@ def _nearest(vertices: Array, faces: Indices, origin: Array, direction: Array, f
         vx, vy, vz = vertices[c, 0] - ax, vertices[c, 1] - ay, vertices[c, 2] - az
         px, py, pz = dy * vz - dz * vy, dz * vx - dx * vz, dx * vy - dy * vx
         det = ux * px + uy * py + uz * pz
-        if det == 0.0:
-            continue
         tx, ty, tz = ox - ax, oy - ay, oz - az
-        u = (tx * px + ty * py + tz * pz) / det
-        if not 0.0 <= u <= 1.0:
+        sign = 1.0 if det > 0.0 else -1.0
+        det *= sign
+        u = sign * (tx * px + ty * py + tz * pz)
+        if not 0.0 <= u <= det or det == 0.0:
             continue
         qx, qy, qz = ty * uz - tz * uy, tz * ux - tx * uz, tx * uy - ty * ux
-        v = (dx * qx + dy * qy + dz * qz) / det
-        if not (v >= 0.0 and u + v <= 1.0):
+        v = sign * (dx * qx + dy * qy + dz * qz)
+        if not (v >= 0.0 and u + v <= det):
             continue
-        distance = (vx * qx + vy * qy + vz * qz) / det
+        distance = sign * (vx * qx + vy * qy + vz * qz) / det
         if 0.0 < distance < nearest:
             nearest, best = distance, face
-            found[0], found[1], found[2] = distance, u, v
+            found[0], found[1], found[2] = distance, u / det, v / det
     return best

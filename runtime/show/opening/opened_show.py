@@ -12,6 +12,7 @@ from replay.recorded_stream import RecordedStream
 from replay.recording import Recording
 from runtime.characters.character import Character
 from runtime.conditioning.switches import asked_for, for_live, for_recording
+from runtime.control.by_hand.chooser import Chooser
 from runtime.control.remote import PORT, Remote
 from runtime.control.show_controls import ShowControls, View
 from runtime.driving.drivers import LIMB_BY_LIMB, DriverFactory
@@ -275,6 +276,14 @@ class OpenedShow:
             takes=takes,
             session=session,
             notices=self.notices,
+            chooser=Chooser(
+                matching,
+                self.puppets,
+                self._stream.skeleton,
+                self.scene,
+                self.notices,
+                recorded=self._recording is not None,
+            ),
             leave_asked=SecondPress(self._clock),
             playback=playback_of(self._stream) if session is None else session.transport,
             scene=self.scene,
@@ -304,4 +313,5 @@ class OpenedShow:
             controls.takes,
             controls.playback,
             controls.session,
+            controls.chooser,
         )

@@ -16,6 +16,7 @@ from runtime.characters.character import Character
 from runtime.conditioning.switches import SWITCHES
 from runtime.control import actions
 from runtime.control.actions import ACTIONS
+from runtime.control.by_hand.choosing_actions import CHOOSING_ACTIONS
 from runtime.control.session_actions import SESSION_ACTIONS
 from runtime.control.sliders import SLIDERS
 from runtime.puppet.deformable_surface import Elasticity
@@ -66,7 +67,7 @@ TRIED_HERE = {
     "match-again", "accept", "next-match", "previous-match", "rest-pose", "calibrate", "hold",
     "play", "pause", "home", "record", "freeze", "in-place", "blackout", "frame-all", "chains",
     "select", "keep-match", "front", "panel", "sliders", "help", "full-screen", "audience",
-    "leave", *FADERS, *SESSION_ACTIONS,
+    "leave", *FADERS, *SESSION_ACTIONS, *CHOOSING_ACTIONS,
     *(f"{name}-{way}" for name in FADERS for way in ("up", "down")), *SWITCHES,
 }  # fmt: skip
 

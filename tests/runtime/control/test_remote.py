@@ -125,6 +125,8 @@ def test_the_whole_table_is_at_hand_by_its_names(show: Staged) -> None:
             show.client.send_message(f"/bunraku/{name}/set", 0.5)
         show.until(lambda: show.remote._waiting == 0 and not show.remote._requests)
     show.until(lambda: show.controls.takes.recording)
+    show.client.send_message("/bunraku/leave", [])  # only what is mapped by hand
+    show.until(lambda: not show.controls.chooser.on)
     show.client.send_message("/bunraku/leave", [])  # asks, while something is recorded
     show.client.send_message("/bunraku/leave", 1.0)
     show.until(lambda: show.controls.leaving)

@@ -12,7 +12,9 @@ from devices.errors import InputError
 from replay.builtin import builtin_recording
 from runtime.characters.open_character import load_character
 from runtime.cli.command_line import main
+from runtime.driving.by_hand.choosing import Target
 from runtime.panel.timeline import Timeline
+from runtime.render.picking import on_screen
 from runtime.session.document import Session
 from runtime.session.files.store import SessionStore
 from runtime.session.transport import Mode
@@ -55,6 +57,9 @@ class Puppeteer:
             self.perform(2)
         self.hands.button(False)
         self.perform(2)
+
+    def click(self, place: tuple[float, float]) -> None:
+        self.drag(place)
 
     @property
     def session(self) -> Session:
@@ -144,3 +149,56 @@ def test_three_takes_are_layered_undone_scrubbed_saved_recovered_and_rendered(
     options = ["--cache", str(cache), "--rate", "30"]
     assert main(["render", str(crashed / "show.bunraku"), *options]) == 0
     assert len(read_pc2(cache)[1]) > 10
+
+
+def test_a_pair_is_clicked_in_the_window_and_drives_and_comes_back(puppeteer: Puppeteer) -> None:
+    """AniMesh, figure 2: one chain of the performer, one of the character, and both move as one."""
+    one = puppeteer
+    chooser, scene = one.show.controls.chooser, one.show.controls.scene
+    assert scene is not None
+
+    def of_performer(name: str) -> tuple[float, float]:
+        parts, joints = chooser._pickable.performer, scene.performer_on_screen
+        assert joints is not None
+        line = joints[list(parts.chains[parts.named(name)])]
+        return tuple(((line[1] + line[2]) / 2.0).tolist())
+
+    def of_squid(name: str) -> tuple[float, float]:
+        target = Target(0, chooser._pickable.character(0).named(name))
+        points = one.show.puppets[0].places[list(chooser._pickable.nodes(target))]
+        places = on_screen(scene.seen_by, SIZE, points + scene.position(0))
+        return tuple(places[len(places) // 2].tolist())
+
+    one.press("f6")
+    assert one.told[0] == "Mapping by hand"
+    one.perform(20)  # until the stage has made room for the card
+    one.press("end")
+    one.click(of_performer("right arm"))
+    assert one.told == (
+        "What moves with the right arm?",
+        "Click the part of squid that the right arm moves.",
+    )
+    one.hands.move(*of_squid("tentacle 2"))
+    one.perform(2)
+    lit = max(scene.lights.chains(0), key=lambda chain: chain.width)  # type: ignore[union-attr]  # while choosing
+    assert lit.width > 1.0, "what lies under the mouse lights up"
+    one.click(of_squid("tentacle 2"))
+    assert "Enter uses this pair." in one.told[1]
+    one.press("enter")
+    assert not chooser.on
+    (match,) = one.show.controls.match_controls.matches
+    assert [(part.name, part.target_name[:10]) for part in match.parts] == [
+        ("right arm", "tentacle 2")
+    ]
+    one.perform(10)
+    (actor,) = one.session.actors
+    if match.rest is not None:
+        assert actor.setup is not None
+        assert actor.setup.match is not None
+        assert actor.setup.match.by_hand
+
+    one.press("f6", "f6")
+    one.press("f6", "end", "escape")
+    assert not chooser.on
+    assert not one.show.controls.leaving
+    assert len(match.parts) == 1

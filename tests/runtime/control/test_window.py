@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from devices.errors import InputError
-from runtime.control.window import KeyPressed, Resized, Window
+from runtime.control.window import Clicked, KeyPressed, Pointed, Resized, Window
 from runtime.render.camera import front_camera
 from runtime.render.context import headless_context, release_headless
 from runtime.render.stage import Stage
@@ -75,6 +75,37 @@ def test_the_mouse_orbits_pans_and_zooms(window: Window) -> None:
     window._on_button(None, glfw.MOUSE_BUTTON_RIGHT, glfw.RELEASE, 0)
     window._on_scroll(None, 0.0, 1.0)
     assert window.camera.distance < turned.distance
+
+
+def test_a_press_and_release_at_one_place_is_a_click_and_a_drag_is_none(window: Window) -> None:
+    window.poll()
+    left = glfw.MOUSE_BUTTON_LEFT
+    window._on_cursor(None, 50.0, 40.0)
+    for moved, button in ((2.0, left), (30.0, left), (0.0, glfw.MOUSE_BUTTON_RIGHT)):
+        window._on_button(None, button, glfw.PRESS, 0)
+        if moved:
+            window._on_cursor(None, 50.0 + moved, 40.0)
+        window._on_button(None, button, glfw.RELEASE, 0)
+        window._on_cursor(None, 50.0, 40.0)
+    pointed = Pointed((50.0, 40.0))
+    there = [Pointed((52.0, 40.0)), Clicked((50.0, 40.0)), pointed]
+    assert window.poll() == [pointed, *there, Pointed((80.0, 40.0)), pointed, pointed]
+
+
+def test_what_the_panel_takes_is_no_click(window: Window) -> None:
+    class Panel:
+        def cursor(self, x: float, y: float) -> bool:
+            return False
+
+        def button(self, button: int, *, down: bool) -> bool:
+            return True
+
+    window.poll()
+    window.taker = Panel()  # type: ignore[assignment]  # takes the mouse only
+    window._on_cursor(None, 50.0, 40.0)
+    window._on_button(None, glfw.MOUSE_BUTTON_LEFT, glfw.PRESS, 0)
+    window._on_button(None, glfw.MOUSE_BUTTON_LEFT, glfw.RELEASE, 0)
+    assert window.poll() == [Pointed((50.0, 40.0))]
 
 
 def test_without_a_display_one_line_says_to_go_headless() -> None:
