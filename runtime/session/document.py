@@ -55,6 +55,8 @@ class Take:
         performance: what the actor did.
         recording: file of the performer's frames in the session; empty where there is none.
         parts: what drove what, a line each: "left arm -> left wing, absolute, 100 %".
+        sound: file in the session of the sound that is heard with it, from its first frame on;
+            empty where there is none.
     """
 
     id: int
@@ -63,6 +65,7 @@ class Take:
     performance: Performance
     recording: str = ""
     parts: tuple[str, ...] = ()
+    sound: str = ""
 
     def __eq__(self, other: object) -> bool:
         return isinstance(other, Take) and self._content == other._content
@@ -73,7 +76,7 @@ class Take:
     @property
     def _content(self) -> tuple[object, ...]:
         key = self.performance.key
-        return self.id, self.name, self.actor, key, self.recording, self.parts
+        return self.id, self.name, self.actor, key, self.recording, self.parts, self.sound
 
 
 @dataclass(frozen=True, slots=True)

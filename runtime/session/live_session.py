@@ -191,7 +191,8 @@ class LiveSession:
         if not self.recording:
             return
         takes = [(layers, layers.stop()) for layers in self._recorded]
-        self._add([(one, made) for one, made in takes if made is not None], self._start, recording)
+        made = [(one, each) for one, each in takes if each is not None]
+        self._add(made, self._start, recording, self._sound() if made else "")
         unfinished.end(self.recordings)
         self.transport.rehearse()
         self.transport.go_to(self._start)
@@ -203,7 +204,7 @@ class LiveSession:
         if not made:
             self._tell("nobody has performed yet")
             return
-        self._add(made, self.transport.position, "")
+        self._add(made, self.transport.position)
 
     def drop_last(self) -> None:
         """Take the clips of the newest take away, so that it can be performed again."""
@@ -220,15 +221,27 @@ class LiveSession:
         self.transport.rehearse()
         self.transport.go_to(start)
 
+    def _sound(self) -> str:
+        """The file of the sound that a take carries; empty where it cannot be kept."""
+        try:
+            return self.store.keep_sound()
+        except InputError as error:
+            self._warn(f"{error}; the take has no sound")
+            return ""
+
     @property
     def _next_name(self) -> str:
         """What the next take is called."""
         return f"take {next_id(self.session.takes)}"
 
     def _add(
-        self, made: Sequence[tuple[ActorLayers, Performance]], start: float, recording: str
+        self,
+        made: Sequence[tuple[ActorLayers, Performance]],
+        start: float,
+        recording: str = "",
+        sound: str = "",
     ) -> None:
-        """Add a take and a clip for each actor, as one step."""
+        """Add a take and a clip for each actor, as one step; the sound goes with the first."""
         if not made:
             self._tell("the take holds no frame: it is not kept")
             return
@@ -238,7 +251,7 @@ class LiveSession:
         for layers, performance in made:
             one = self._staged[self._layers.index(layers)]
             parts = tuple(one.parts())
-            take = Take(0, name, layers.actor, performance, recording, parts)
+            take = Take(0, name, layers.actor, performance, recording, parts, sound)
             try:
                 self.store.keep(performance, _skeleton(one.puppet))
             except InputError as error:
@@ -246,6 +259,7 @@ class LiveSession:
                 continue
             session = edits.with_take(session, take, start, speed=min(max(speed, 1 / 16), 16.0))
             self._last.append(session.clips[-1].id)
+            sound = ""
         if self._last and session.punch is not None:
             session = self._punched(session)
         if len(session.takes) == len(self.session.takes):

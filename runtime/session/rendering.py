@@ -14,11 +14,13 @@ from runtime.characters.builtin import BUILTIN
 from runtime.characters.open_character import load_character
 from runtime.session.actor_layers import ActorLayers, Cue
 from runtime.session.files.archive import unpack
-from runtime.session.files.folder import SessionFolder
+from runtime.session.files.folder import SOUNDS, SessionFolder
 from runtime.session.nobody import nobody_for
 from runtime.show.open_stream import play
-from runtime.show.settings import MatchSettings, ShowSettings
+from runtime.show.settings import FileSettings, MatchSettings, ShowSettings
 from runtime.show.show import Show
+from runtime.sound.mix import heard_in, write_mix
+from runtime.sound.sounds import Sounds
 
 MOST_FRAMES = 10_000_000
 
@@ -82,6 +84,7 @@ class RenderedSession:
             InputError: a file cannot be written, or a character cannot be read.
         """
         session = self.session
+        settings = replace(settings, files=self._with_sound(settings.files, tell))
         drive = session.actors[0].drive if session.actors else "auto"
         match = MatchSettings(driver=drive, rehearse=False)
         characters = [self._character(actor.character) for actor in session.actors]
@@ -104,6 +107,15 @@ class RenderedSession:
                 )
             puppet.layers = ActorLayers(actor.id, puppet, cue, frozenset)
         return show
+
+    def _with_sound(self, files: FileSettings, warn: Callable[[str], None]) -> FileSettings:
+        """The files that are written, with the sound of the range where a video is one of them."""
+        heard = heard_in(self.session, Sounds(self._folder / SOUNDS, warn)) if files.video else []
+        if not heard:
+            return files
+        mix = self._folder / "mix.wav"
+        write_mix(mix, heard, self._start, self._seconds + 1.0 / self._rate)
+        return replace(files, video_sound=mix)
 
     def close(self) -> None:
         """Delete what was unpacked; may be called twice."""

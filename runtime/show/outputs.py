@@ -109,7 +109,9 @@ def open_outputs(
             own.append(kept(path, PointCache(path, character)))
         outputs.append(own)
     if files.video is not None:
-        video = Video(files.video, rate=rate, pictures_a_second=settings.fps)
+        video = Video(
+            files.video, rate=rate, pictures_a_second=settings.fps, sound=files.video_sound
+        )
         outputs[0].append(kept(files.video, video))
         if settings.transparent:
             warn(f"{files.video} is black where it is transparent: --frames keeps transparency")

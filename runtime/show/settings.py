@@ -120,6 +120,7 @@ class FileSettings:
         export: the performed character as .glb, .usdc, .usda or .bvh.
         export_within: how far the surface of a .glb, or a joint of a .bvh, may be from where it
             was performed, as a share of the height; None for a skin alone, or rigid bones.
+        video_sound: a WAV file of 16-bit PCM that is heard in the video, from its first picture on.
         takes: recordings that are started while the show runs are called ``NAME-1.mcap`` and so on
             beside this one; None: beside `record`, or ``take.mcap`` in the current folder.
 
@@ -134,10 +135,20 @@ class FileSettings:
     record: Path | None = None
     export: Path | None = None
     export_within: float | None = None
+    video_sound: Path | None = None
     takes: Path | None = None
 
     def __post_init__(self) -> None:
-        for name in ("video", "frames", "cache", "report", "record", "export", "takes"):
+        for name in (
+            "video",
+            "frames",
+            "cache",
+            "report",
+            "record",
+            "export",
+            "video_sound",
+            "takes",
+        ):
             _check_path(self, name)
 
 
@@ -288,7 +299,8 @@ class ShowSettings:
     @property
     def is_noticed(self) -> bool:
         """Whether anybody gets anything of the show: by a window, file, sender or remote."""
-        files = replace(self.files, export_within=None)  # which writes nothing by itself
+        # Neither of these writes anything by itself.
+        files = replace(self.files, export_within=None, video_sound=None)
         asked: list[object] = [
             *(getattr(files, each.name) for each in fields(files)),
             *(getattr(self.senders, each.name) for each in fields(self.senders)),

@@ -37,6 +37,7 @@ def lines_of(path: Path, opened: Opened) -> list[str]:
         *(
             f"take        {take.id}: {printable(take.name)}, of {_name(session, take.actor)}, "
             f"{take.performance.duration:.2f} s, {len(take.performance.nodes)} nodes"
+            + (", with sound" if take.sound else "")
             for take in session.takes
         ),
         *(_clip(session, clip) for clip in session.clips),

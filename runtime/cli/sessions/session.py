@@ -46,6 +46,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--take", action="store_true", help="begin a take as soon as somebody performs"
     )
     parser.add_argument(
+        "--sound",
+        action=Once,
+        type=Path,
+        metavar="FILE",
+        help="takes carry this sound from their first frame on; videos of the session have it",
+    )
+    parser.add_argument(
         "--at",
         type=seconds,
         default=0.0,
@@ -76,8 +83,11 @@ def run(options: argparse.Namespace) -> int:
     from runtime.output.files.kept_file import counting
     from runtime.session.files.store import SessionStore
     from runtime.show import messages
+    from runtime.sound.sound import read_sound
 
+    sound = None if options.sound is None else read_sound(options.sound)
     store = SessionStore(options.session)
+    store.sound = sound
     try:
         options.character = store.adopt(options.character or [])
         if store.session.actors and options.drive == "auto":

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from devices.errors import InputError
 from runtime.output.files.video_file import VideoFile
+from runtime.output.files.video_sound import VideoSound
 from runtime.output.files.whole_file import check_suffix, check_writable, writing
 from runtime.output.output import PerformedFrame
 from runtime.output.pictures import premultiplied
@@ -63,13 +64,22 @@ class Video:
             frame when it is the only one.
         pictures_a_second: pictures per second that the video needs; frames without a picture are
             skipped.
+        sound: a WAV file of 16-bit PCM that is heard from the first picture on, AAC or Opus in the
+            video; it is cut where the pictures end. None for a silent video.
 
     Raises:
         InputError: the suffix is unknown, PyAV or an encoder is missing, or the file cannot be
             written.
     """
 
-    def __init__(self, path: Path, *, rate: float = 30.0, pictures_a_second: float = 60.0) -> None:
+    def __init__(
+        self,
+        path: Path,
+        *,
+        rate: float = 30.0,
+        pictures_a_second: float = 60.0,
+        sound: Path | None = None,
+    ) -> None:
         self.pictures_a_second = pictures_a_second
         encoders = _ENCODERS[check_suffix(path, tuple(_ENCODERS))]
         check_writable(path)
@@ -79,12 +89,15 @@ class Video:
         self._encoder, self._options = _first_available(self._av, encoders, path)
         self._start = 0.0
         self._last: int | None = None  # presentation time of the newest frame [ticks]
+        self._step = round(_TICKS / self._rate)  # its duration if it is the last one [ticks]
         self._stream: Any = None
+        self._wav = sound
+        self._sound: VideoSound | None = None
         kind = _CONTAINERS[path.suffix.lower()]
         with self._writing():
             self._file = VideoFile(path)
             self._container: Any = self._av.open(
-                self._file, "w", format=kind, options=_container_options(self._av, kind)
+                self._file, "w", format=kind, options=_container_options(self._av, kind, sound)
             )
 
     def write(self, frame: PerformedFrame) -> None:
@@ -111,6 +124,8 @@ class Video:
             encoded.time_base = Fraction(1, _TICKS)
             encoded.pts, encoded.duration = self._place(frame.time)
             with self._file.piece():
+                if self._sound is not None:
+                    self._sound.advance(frame.time - self._start)
                 self._container.mux(self._stream.encode(encoded))
 
     def close(self) -> None:
@@ -127,7 +142,11 @@ class Video:
                 if self._stream is not None and not self._file.abandoned:
                     with self._file.piece():
                         container.mux(self._stream.encode(None))
+                        if self._sound is not None and self._last is not None:
+                            self._sound.finish((self._last + self._step) / _TICKS)
             finally:
+                if self._sound is not None:
+                    self._sound.close()
                 with self._file.piece():
                     container.close()
         if self._stream is None and self._path.is_file():
@@ -138,10 +157,10 @@ class Video:
         ticks = round(_TICKS * (time - self._start))
         if self._last is None:
             self._last = ticks
-            return ticks, round(_TICKS / self._rate)
+            return ticks, self._step
         shown = max(ticks, self._last + _SHORTEST)
-        step, self._last = shown - self._last, shown
-        return shown, step
+        self._step, self._last = shown - self._last, shown
+        return shown, self._step
 
     def _add_stream(self, width: int, height: int) -> Any:
         stream = self._container.add_stream(self._encoder, rate=self._rate, options=self._options)
@@ -152,6 +171,9 @@ class Video:
         codec.gop_size = max(1, round(self._rate))  # a key frame, and so a fragment, a second
         codec.color_primaries = codec.color_trc = codec.colorspace = _BT709
         codec.color_range = _LIMITED_RANGE
+        if self._wav is not None:
+            suffix = self._path.suffix.lower()
+            self._sound = VideoSound(self._av, self._container, self._wav, suffix)
         return stream
 
     @contextmanager
@@ -205,13 +227,18 @@ def _first_available(
     )
 
 
-def _container_options(av: Any, kind: str) -> dict[str, str]:
-    """Return muxer flags that make every second of the file readable once it is written."""
+def _container_options(av: Any, kind: str, sound: Path | None) -> dict[str, str]:
+    """Return muxer flags that make every second of the file readable once it is written.
+
+    AAC begins before the first sample. Without an edit list that says so, all pictures are shown
+    later in place of it.
+    """
     if kind not in ("mp4", "mov"):
         return {"flush_packets": "1"}  # Matroska clusters are independent
     hybrid = av.library_versions["libavformat"] >= (62,)
     flags = "hybrid_fragmented" if hybrid else "frag_keyframe+empty_moov+default_base_moof"
-    return {"movflags": flags, "flush_packets": "1"}
+    begins = {} if sound is None else {"use_editlist": "1"}
+    return {"movflags": flags, "flush_packets": "1", **begins}
 
 
 def _even(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -16,7 +16,7 @@ from typing import BinaryIO
 from devices.errors import InputError
 from replay.bounds import check_recordable
 from runtime.output.files.whole_file import whole_file
-from runtime.session.files.folder import CHARACTERS, DOCUMENT, PERFORMANCES, RECORDINGS
+from runtime.session.files.folder import DOCUMENT, FOLDERS, SOUNDS
 
 SUFFIX = ".bunraku"
 MOST_ENTRIES = 100_000
@@ -27,7 +27,6 @@ _UNPACKED = f".{DOCUMENT}"  # the JSON until all other files are there
 _HEADER = struct.Struct("<4sHHHHHIIIHH")
 _MAGIC = b"PK\x03\x04"
 _STORED, _DEFLATED = 0, 8
-_FOLDERS = (PERFORMANCES, RECORDINGS, CHARACTERS)
 
 
 def pack(folder: Path, files: list[str], path: Path) -> None:
@@ -46,7 +45,9 @@ def pack(folder: Path, files: list[str], path: Path) -> None:
         zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as packed,
     ):
         for name in files:
-            packed.write(folder / name, name)
+            # Silence would unpack to far more than its size, which is refused below.
+            kind = zipfile.ZIP_STORED if name.startswith(f"{SOUNDS}/") else zipfile.ZIP_DEFLATED
+            packed.write(folder / name, name, kind)
 
 
 def unpack(path: Path, folder: Path) -> list[str]:
@@ -170,4 +171,4 @@ def _is_inside(name: str) -> bool:
     parts = name.split("/")
     if parts == [DOCUMENT]:
         return True
-    return len(parts) > 1 and parts[0] in _FOLDERS and all(p not in ("", ".", "..") for p in parts)
+    return len(parts) > 1 and parts[0] in FOLDERS and all(p not in ("", ".", "..") for p in parts)

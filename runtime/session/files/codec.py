@@ -28,7 +28,7 @@ from runtime.session.files.setup_codec import setup_as_json, setup_from_json
 from runtime.session.performance import Performance
 
 FORMAT = "bunraku session"
-VERSION = 2
+VERSION = 3
 
 Upgrade = Callable[[Json], Json]
 
@@ -38,7 +38,12 @@ def _with_setups(fields: Json) -> Json:
     return fields | {"actors": [{"setup": None} | each for each in objects(fields, "actors")]}
 
 
-UPGRADES: Mapping[int, Upgrade] = {1: _with_setups}
+def _with_sounds(fields: Json) -> Json:
+    """Version 3 has takes with sound."""
+    return fields | {"takes": [{"sound": ""} | each for each in objects(fields, "takes")]}
+
+
+UPGRADES: Mapping[int, Upgrade] = {1: _with_setups, 2: _with_sounds}
 """For each older version what makes the next one of it."""
 
 _CHARACTER = re.compile(r"[a-z0-9-]{1,40}|characters/[0-9]{1,6}/[^/\\:\0]{1,200}")
@@ -68,6 +73,7 @@ def as_json(session: Session) -> Json:
                 "performance": take.performance.key,
                 "recording": take.recording,
                 "parts": list(take.parts),
+                "sound": take.sound,
             }
             for take in session.takes
         ],
@@ -196,7 +202,7 @@ def _character(fields: Json) -> str:
 
 
 def _take(fields: Json, performance: Callable[[str], Performance]) -> Take:
-    recording = text(fields, "recording")
+    recording, sound = text(fields, "recording"), text(fields, "sound")
     return Take(
         whole(fields, "id"),
         text(fields, "name"),
@@ -204,6 +210,7 @@ def _take(fields: Json, performance: Callable[[str], Performance]) -> Take:
         performance(file_name(fields, "performance")),
         file_name(fields, "recording") if recording else "",
         tuple(str(line)[: 2 * MOST_NAME] for line in items(fields, "parts")),
+        file_name(fields, "sound") if sound else "",
     )
 
 

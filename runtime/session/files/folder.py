@@ -11,7 +11,7 @@ import json
 import os
 import shutil
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from devices.bounded_json import parse_json
@@ -24,9 +24,12 @@ from runtime.session.files import codec
 from runtime.session.files.lock import FolderLock
 from runtime.session.files.performance_file import read_performance, save_performance
 from runtime.session.performance import Performance
+from runtime.sound.sound import Sound, read_sound
 
 DOCUMENT = "session.json"
 PERFORMANCES, RECORDINGS, CHARACTERS = "performances", "recordings", "characters"
+SOUNDS = "sounds"
+FOLDERS = (PERFORMANCES, RECORDINGS, CHARACTERS, SOUNDS)
 MOST_DOCUMENT = 64 << 20  # bytes
 
 
@@ -61,7 +64,7 @@ class SessionFolder:
         with writing(path):
             if not self.exists:
                 self._clear()  # of a program that was killed before it had written the session
-            for name in (PERFORMANCES, RECORDINGS, CHARACTERS):
+            for name in FOLDERS:
                 (path / name).mkdir(exist_ok=True)
         self._performances: dict[str, Performance] = {}
 
@@ -69,6 +72,11 @@ class SessionFolder:
     def recordings(self) -> Path:
         """Where the recordings of takes are."""
         return self.path / RECORDINGS
+
+    @property
+    def sounds(self) -> Path:
+        """Where the sounds of takes are."""
+        return self.path / SOUNDS
 
     @property
     def exists(self) -> bool:
@@ -89,6 +97,18 @@ class SessionFolder:
         path = self._file_of(performance.key)
         if not path.is_file():
             save_performance(path, performance, skeleton)
+
+    def keep_sound(self, sound: Sound) -> str:
+        """Write a sound, unless it is there; return the name of its file.
+
+        Raises:
+            InputError: the disk fails.
+        """
+        path = self.sounds / f"{sound.key}.wav"
+        if not path.is_file():
+            with whole_file(path) as partial:
+                partial.write_bytes(sound.wav)
+        return path.name
 
     def write(self, session: Session) -> None:
         """Write the session; its performances have been kept before.
@@ -128,7 +148,7 @@ class SessionFolder:
         """Delete all files, the JSON first: a session that has lost only some is never read."""
         with suppress(OSError):
             (self.path / DOCUMENT).unlink(missing_ok=True)
-        for name in (PERFORMANCES, RECORDINGS, CHARACTERS):
+        for name in FOLDERS:
             shutil.rmtree(self.path / name, ignore_errors=True)
         for partial in self.path.glob(".*"):
             partial.unlink(missing_ok=True)
@@ -142,12 +162,27 @@ class SessionFolder:
                 lost[name] = str(error)
         left = codec.without_takes(document, set(lost))
         session = codec.from_json(left, self._performances.__getitem__)
+        silent = [take for take in session.takes if take.sound and not self._is_heard(take.sound)]
+        session = replace(
+            session,
+            takes=tuple(
+                replace(take, sound="") if take in silent else take for take in session.takes
+            ),
+        )
         gone = [
             f"take {take.get('id')} ({take.get('name')}) is lost: {lost[take['performance']]}"
             for take in codec.takes_in(document)
             if take.get("performance") in lost
         ]
+        gone += [f"the sound of take {take.id} ({take.name}) is lost" for take in silent]
         return Opened(session, tuple(gone))
+
+    def _is_heard(self, name: str) -> bool:
+        """Whether the sound of a name is there, with the content that the name says."""
+        try:
+            return f"{read_sound(self.sounds / name).key}.wav" == name
+        except InputError:
+            return False
 
     def _whole(self, name: str) -> Performance:
         """The performance of a name, which its content must have.

@@ -18,11 +18,13 @@ from runtime.session.files.folder import (
     DOCUMENT,
     PERFORMANCES,
     RECORDINGS,
+    SOUNDS,
     SessionFolder,
 )
 from runtime.session.files.unfinished import rescue
 from runtime.session.performance import Performance
 from runtime.session.versions import Versions
+from runtime.sound.sound import Sound
 
 UNSAVED = ".unsaved"
 
@@ -40,6 +42,7 @@ class SessionStore:
         notes: what was lost or recovered, a line each.
         characters: for each actor of a new session its character: a built-in one, or a file in the
             session; empty where nobody has said.
+        sound: that the takes to come carry; None for none.
 
     Raises:
         InputError: it cannot be read or written, is of a newer version, or is open elsewhere.
@@ -52,6 +55,7 @@ class SessionStore:
         beside = path.with_name(path.name + UNSAVED)
         self.notes: list[str] = []
         self.characters: list[str] = []
+        self.sound: Sound | None = None
         recovered = (beside / DOCUMENT).is_file()
         self.folder = SessionFolder(beside)
         session = Session()
@@ -131,6 +135,14 @@ class SessionStore:
         """Write a performance that the session will mention: see `SessionFolder.keep`."""
         self.folder.keep(performance, skeleton)
 
+    def keep_sound(self) -> str:
+        """Write the sound that a take carries; return the name of its file, empty for no sound.
+
+        Raises:
+            InputError: the disk fails.
+        """
+        return "" if self.sound is None else self.folder.keep_sound(self.sound)
+
     def write(self) -> None:
         """Write the version that counts to the disk, if it is not the one written last.
 
@@ -172,6 +184,7 @@ class SessionStore:
         session, folder = self.session, self.folder.path
         named = [f"{PERFORMANCES}/{take.performance.key}.glb" for take in session.takes]
         named += [f"{RECORDINGS}/{take.recording}" for take in session.takes if take.recording]
+        named += [f"{SOUNDS}/{take.sound}" for take in session.takes if take.sound]
         characters = sorted(path for path in (folder / CHARACTERS).rglob("*") if path.is_file())
         named += [path.relative_to(folder).as_posix() for path in characters]
         there = [name for name in dict.fromkeys(named) if (folder / name).is_file()]
