@@ -111,6 +111,15 @@ class Forelegs:
             self._standing = self._hooves(bodies.upright)
         self._shares = np.ones(len(arms))
         self._moves = np.zeros((len(arms), 3))
+        self._load(rest)
+
+    def _load(self, rest: Array) -> None:
+        """Use the kernels once at rest, so that no frame waits for them."""
+        still = np.tile([0.0, 0.0, 0.0, 1.0], (len(rest), 1))
+        out = np.empty((len(self._long), _SEGMENTS, 4))
+        legs, moves = self._legs, self._moves
+        _plant_all(legs, moves, 0.0, rest, still, out)
+        _sinks(legs, moves, 0.0, self._shares, self._long, self._root, rest, still)
 
     def follow(self, joints: Array, heights: Array) -> bool:
         """Take in a frame; return whether any foreleg stands.
