@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -12,6 +13,7 @@ from devices.bodies.body_plan import BodyPlan, Limb
 from devices.bodies.joint_names import Side
 from devices.bodies.limb_segments import arm_segments, leg_segments
 from runtime.characters.body_shape import LEAST, UP, BodyShape, Roles
+from runtime.characters.creatures.wings import are_wings
 from solvers.skeleton.limbs import bones_in_trunk, surface_points
 from solvers.skeleton.mirror_pairs import LimbPair, MirroredTree, evenly, mirrored_tree
 from solvers.skeleton.mirror_plane import MirrorPlane
@@ -60,6 +62,8 @@ def plan_by_shape(
         roles = shape.roles()
         if roles is not None and (worth := _worth(shape, halves, roles)) > most:
             best, most = _Plan(tree, halves, roles, inside, size).plan(), worth
+    if best is not None and best.arm_word == "arm" and are_wings(points, tree, best):
+        return replace(best, arm_word="wing")
     return best
 
 

@@ -24,6 +24,7 @@ from runtime.driving.body.path import Path
 from runtime.driving.body.rearing import Rearing, pitched
 from runtime.driving.body.serpent import Serpent, is_serpent
 from runtime.driving.body.upright import upright_at_rest, upright_in_poses
+from runtime.driving.body.wings import Wings
 from runtime.driving.driver import Highlight, Needs
 from runtime.driving.pairing import Pairing
 from runtime.driving.performer import Pose, Rest
@@ -132,7 +133,7 @@ class BodyDriver:
         self._footing = Footing(bodies, parts, vertices, owner)
         self._ends = _ends(bodies)
         self._held_hands = HeldHands(bodies) if are_held(bodies) else None
-        self._rearing = Rearing(bodies)
+        self._rearing, self._wings = Rearing(bodies), Wings(bodies, parts.arms)
         self._forelegs = Forelegs(bodies, parts.arms, (vertices, skeleton.skin), self._ratio)
         self._long_arms = LongArms(bodies.tree, vertices, owner, parts.arms, parts.legs)
         self._at_rest = Targets(skeleton.skinned(skeleton.rest_nodes), nodes=skeleton.rest_nodes)
@@ -194,6 +195,7 @@ class BodyDriver:
         if self._bearing is not None:
             trunk = self._bearing.of(trunk)
         self._footing.turn_soles(joints, left, pose.time, given)
+        self._wings.spread(joints, trunk[1], given)
         pose_limbs(rig, joints, trunk, given, self._twists, rotations, positions)
         if self._many_legs is not None:
             self._many_legs.step(joints, positions, rotations, given)

@@ -13,7 +13,7 @@ from devices.bodies.joint_labels import label_joints
 from devices.bodies.joint_names import Kind, Side
 from devices.skeleton import Skeleton
 from runtime.driving.body.rig_builder import RigBuilder
-from runtime.driving.driver import RELATIVE, DrivenPart
+from runtime.driving.driver import ABSOLUTE, RELATIVE, DrivenPart
 from runtime.driving.part_names import part_name
 from solvers.retarget.limb_posing import LimbRig
 from solvers.retarget.trunk_turns import TrunkJoints
@@ -207,6 +207,9 @@ def _pointing(bodies: TwoBodies, rig: RigBuilder, least_upright: float) -> _Limb
         limbs.parts.append(bodies.part(theirs.chain, ours.chain, drive))
         if theirs.lower and ours.lower:
             limbs.legs.append(Leg(_bends(theirs), _bends(ours), segments))
+    if plan.arm_word == "wing":
+        limbs.arms.extend(_wings(bodies, rig, limbs.parts))
+        return limbs
     drive = rig.drive_of(plan.arms.values(), least_upright)
     for side, theirs, ours in bodies.pairs(source.arms, plan.arms):
         palms = _knuckles(source, side), _knuckles(plan, side)
@@ -217,6 +220,14 @@ def _pointing(bodies: TwoBodies, rig: RigBuilder, least_upright: float) -> _Limb
         limbs.arms.append(Arm(side, ours.chain, numbers, starts, wrist))
         rig.add_fingers(source, plan, side)
     return limbs
+
+
+def _wings(bodies: TwoBodies, rig: RigBuilder, parts: list[DrivenPart]) -> Iterator[Arm]:
+    """Let wings follow arms, bone for bone of their own."""
+    for side, theirs, ours in bodies.pairs(bodies.source.arms, bodies.plan.arms):
+        parts.append(bodies.part(theirs.chain, ours.chain, ABSOLUTE))
+        wrist = (ours.lower or ours.upper)[-1]
+        yield Arm(side, ours.chain, rig.add_wing(theirs, ours), ours.chain[:-1], wrist)
 
 
 def _stepping(bodies: TwoBodies, rig: RigBuilder) -> _Limbs:

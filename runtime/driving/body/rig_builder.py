@@ -109,6 +109,18 @@ class RigBuilder:
             self._take_beside(ours, self._add(ours.end, wrist, wrist))
         return tuple(range(first, len(self._near)))
 
+    def add_wing(self, theirs: Limb, ours: Limb) -> tuple[int, ...]:
+        """Let each bone of a wing turn on its own with an arm; return the numbers of its segments.
+
+        See `Wings`, which says how they turn.
+        """
+        first, lower = len(self._near), theirs.lower or theirs.upper
+        inner = len(ours.upper) - 1
+        for bone in range(len(ours.chain) - 1):
+            source = theirs.upper if bone < inner else lower
+            self._add(ours.chain[bone : bone + 2], source[0], source[-1])
+        return tuple(range(first, len(self._near)))
+
     def _add_hand(
         self,
         theirs: Limb,
