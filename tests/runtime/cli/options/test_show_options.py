@@ -117,7 +117,7 @@ def test_no_field_of_the_settings_is_forgotten() -> None:
     for_the_library = {
         ShowSettings: {"pictures", "kiosk"},  # `bunraku session` alone has a kiosk
         MatchSettings: {"rehearse"},
-        FileSettings: {"takes"},
+        FileSettings: {"takes", "video_sound"},  # a session's takes bring their own sound
     }
     source = "".join(
         Path(str(made.__code__.co_filename)).read_text(encoding="utf-8")
