@@ -13,6 +13,7 @@ from runtime.cli.options.arguments import counting, positive
 from runtime.show.settings import DRIVES
 
 HELP = "measure the speed of this machine"
+USAGE = "[NAME] [OPTIONS]"
 
 DEFAULT = ("arap", "table1", "hold", "dense", "tick", "layers", "match", "spacetime")
 LONG = ("clips", "likeness", "soak", "kill", "latency", "fuzz")  # only when named
@@ -20,55 +21,59 @@ LONG = ("clips", "likeness", "soak", "kill", "latency", "fuzz")  # only when nam
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments and options."""
-    parser.add_argument(
+    measured = parser.add_argument_group("what is measured")
+    measured.add_argument(
         "name",
         nargs="?",
         metavar="NAME",
-        help="arap, table1, hold, dense, tick, layers, match or spacetime (default: all); or "
-        "clips, likeness, soak, kill, latency or fuzz, which take long",
+        help="arap, table1, hold, dense, tick, layers, match or spacetime (default: each of "
+        "these); or clips, likeness, soak, kill, latency or fuzz, which take long",
     )
-    parser.add_argument(
-        "--seconds", type=positive, metavar="N", help="soak: seconds of show (default 3600)"
+    measured.add_argument(
+        "--json", type=Path, metavar="FILE", help="also write the figures to this file"
     )
-    parser.add_argument(
-        "--real-time", action="store_true", help="soak: run at 60 Hz, not as fast as possible"
-    )
-    parser.add_argument(
-        "--load", action="store_true", help="latency: measure also while another process is busy"
-    )
-    parser.add_argument(
+    played = parser.add_argument_group("clips, likeness and fuzz")
+    played.add_argument(
         "--recording",
         action="append",
         type=Path,
         metavar="FILE",
-        help="clips, likeness: play this recording, not a built-in one; fuzz: damage it too; may "
-        "be repeated",
+        help="play this recording (default: built-in ones); fuzz: damage it, too; repeat the "
+        "option for several",
     )
-    parser.add_argument(
+    played.add_argument(
         "--character",
         action="append",
         metavar="C",
-        help="clips, likeness: use this character, not the built-in ones; fuzz: damage it too; may "
-        "be repeated",
+        help="use this character (default: all built-in ones); fuzz: damage it, too; repeat the "
+        "option for several",
     )
-    parser.add_argument(
-        "--drive", choices=DRIVES, help="likeness: how the characters follow (default auto)"
+    likeness = parser.add_argument_group("likeness")
+    likeness.add_argument(
+        "--drive", choices=DRIVES, help="how the characters follow (default: auto)"
     )
-    parser.add_argument(
+    likeness.add_argument(
         "--sheets",
         type=Path,
         metavar="DIR",
-        help="likeness: draw moments of each pair into a picture in this folder",
+        help="draw moments of each pair into a picture in this folder",
     )
-    parser.add_argument(
-        "--inputs", type=counting, metavar="N", help="fuzz: damaged inputs (default 200000)"
+    soak = parser.add_argument_group("soak")
+    soak.add_argument(
+        "--seconds", type=positive, metavar="N", help="seconds of show (default: 3600)"
     )
-    parser.add_argument(
-        "--seed", type=int, metavar="N", help="fuzz: another seed damages otherwise (default 0)"
+    soak.add_argument(
+        "--real-time", action="store_true", help="run at 60 Hz (default: as fast as possible)"
     )
-    parser.add_argument(
-        "--json", type=Path, metavar="FILE", help="also write the figures to this file"
+    latency = parser.add_argument_group("latency")
+    latency.add_argument(
+        "--load", action="store_true", help="measure also while another process is busy"
     )
+    fuzz = parser.add_argument_group("fuzz")
+    fuzz.add_argument(
+        "--inputs", type=counting, metavar="N", help="number of damaged inputs (default: 200000)"
+    )
+    fuzz.add_argument("--seed", type=int, metavar="N", help="seed of all damage (default: 0)")
 
 
 def run(options: argparse.Namespace) -> int:

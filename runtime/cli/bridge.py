@@ -17,29 +17,35 @@ if TYPE_CHECKING:
     from runtime.output.live.bridge_publisher import BridgePublisher
 
 HELP = "send a live performer to shows on other machines"
+USAGE = """--device URL [--bind tcp://HOST:PORT] [--keys DIR] [--seconds N]
+--make-keys DIR"""
 POLLS = 240.0  # a second: twice the rate of the fastest sensor
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments and options."""
-    parser.add_argument("--device", metavar="URL", help="the device; `bunraku devices` lists them")
-    parser.add_argument(
+    needed = parser.add_argument_group("needed, one of both")
+    needed.add_argument("--device", metavar="URL", help="the device; `bunraku devices` lists them")
+    needed.add_argument(
+        "--make-keys", type=Path, metavar="DIR", help="write keys for both machines and exit"
+    )
+    sent = parser.add_argument_group("where the performer is sent, and how long")
+    sent.add_argument(
         "--bind",
         default="tcp://127.0.0.1:5570",
         metavar="tcp://HOST:PORT",
-        help="address of the bridge, which shows open as zmq+tcp://HOST:PORT (default "
-        "tcp://127.0.0.1:5570)",
+        help="the address of the bridge; the --device of a show is zmq+tcp://HOST:PORT (default: "
+        "%(default)s)",
     )
-    parser.add_argument(
+    sent.add_argument(
         "--keys",
         type=Path,
         metavar="DIR",
-        help="keys of this machine, needed for shows on other machines",
+        help="the keys of this machine, which shows on other machines need (default: none)",
     )
-    parser.add_argument(
-        "--make-keys", type=Path, metavar="DIR", help="write keys for both machines and exit"
+    sent.add_argument(
+        "--seconds", type=positive, metavar="N", help="stop after N seconds (default: at Ctrl-C)"
     )
-    parser.add_argument("--seconds", type=positive, metavar="N", help="stop after N s")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -45,6 +45,9 @@ class Command(Protocol):
     HELP: str
     """What the command does, in a few words."""
 
+    USAGE: str
+    """What may follow the command's name, first what must; a line for each way to call it."""
+
     def add_arguments(self, parser: argparse.ArgumentParser, /) -> None:
         """Add the command's arguments and options."""
 
@@ -74,17 +77,37 @@ def parser() -> argparse.ArgumentParser:
     """Every command with its options."""
     top = _Parser(
         prog="bunraku",
+        usage="bunraku COMMAND [OPTIONS]",
         description="A performer moves, and any character on the screen moves with them.",
+        epilog="`bunraku COMMAND --help` shows the options of a command.",
+        add_help=False,
     )
-    top.add_argument("--version", action=_ShowVersion, nargs=0, help="print the version and exit")
-    subparsers = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    subparsers = top.add_subparsers(
+        title="commands", prog="bunraku", dest="command", required=True, metavar="COMMAND"
+    )
     for name in COMMANDS:
         folder = "runtime.cli.sessions" if name in IN_SESSIONS else "runtime.cli"
         command = cast(Command, import_module(f"{folder}.{name}"))
-        own = subparsers.add_parser(name, help=command.HELP, description=command.HELP)
+        own = subparsers.add_parser(
+            name,
+            help=command.HELP,
+            description=f"{command.HELP[0].upper()}{command.HELP[1:]}.",
+            usage="\n       ".join(f"%(prog)s {line}" for line in command.USAGE.splitlines()),
+            add_help=False,
+        )
         command.add_arguments(own)
+        _add_help(own)
         own.set_defaults(run=command.run)
+    about = _add_help(top)
+    about.add_argument("--version", action=_ShowVersion, nargs=0, help="print the version and exit")
     return top
+
+
+def _add_help(parser: argparse.ArgumentParser) -> argparse._ArgumentGroup:
+    """Add `--help` in a group of its own, below all others."""
+    group = parser.add_argument_group("help")
+    group.add_argument("-h", "--help", action="help", help="print this page and exit")
+    return group
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -9,27 +9,35 @@ from runtime.cli.options.arguments import positive, whole
 from runtime.cli.options.input_options import add_input_options, stated
 
 HELP = "convert a recording to another format"
+USAGE = "IN OUT.{mcap,bvh,csv} [OPTIONS]"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments and options."""
-    parser.add_argument("recording", type=Path, metavar="IN", help="any recording")
-    parser.add_argument(
-        "out", type=Path, metavar="OUT.{mcap,bvh,csv}", help="the file to write, by its suffix"
+    needed = parser.add_argument_group("needed")
+    needed.add_argument(
+        "recording", type=Path, metavar="IN", help="a recording; docs/recordings.md lists formats"
     )
-    parser.add_argument(
-        "--performer", type=whole, metavar="N", help="write performer N only (default: all)"
+    needed.add_argument(
+        "out",
+        type=Path,
+        metavar="OUT.{mcap,bvh,csv}",
+        help="the file to write; its suffix chooses the format",
     )
-    parser.add_argument(
-        "--unit", choices=("cm", "m", "mm", "in"), help="unit of a BVH file (default cm)"
+    written = parser.add_argument_group("what is written")
+    written.add_argument(
+        "--performer", type=whole, metavar="N", help="write only performer N (default: all)"
     )
-    parser.add_argument(
+    written.add_argument(
+        "--unit", choices=("cm", "m", "mm", "in"), help="the unit of a BVH file (default: cm)"
+    )
+    written.add_argument(
         "--rate",
         type=positive,
         metavar="HZ",
-        help="frames per second of a BVH file (default: the recording's)",
+        help="frames per second of a BVH file (default: those of the recording)",
     )
-    parser.add_argument("--force", action="store_true", help="replace OUT if it already exists")
+    written.add_argument("--force", action="store_true", help="replace OUT if it already exists")
     add_input_options(parser)
 
 

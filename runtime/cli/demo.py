@@ -6,16 +6,22 @@ import argparse
 import os
 import sys
 
-from runtime.cli.options.show_options import add_character_option, add_show_options
+from runtime.cli.options.show_options import (
+    add_character_option,
+    add_playback_options,
+    add_show_options,
+)
 
 HELP = "play the built-in show with the built-in characters"
+USAGE = "[OPTIONS]"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments and options."""
-    add_character_option(parser, required=False)
+    add_character_option(parser.add_argument_group("characters"), default="all built-in ones")
+    add_playback_options(parser)
     add_show_options(parser)
-    parser.set_defaults(fps=30.0, size=(1280, 560))
+    parser.set_defaults(fps=30.0, size="1280x560")
 
 
 def run(options: argparse.Namespace) -> int:

@@ -8,20 +8,27 @@ from pathlib import Path
 from runtime.cli.options.arguments import positive
 
 HELP = "list connected devices, arriving data and taken ports"
+USAGE = "[URL ...] [--seconds N] [--json FILE]"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments and options."""
-    parser.add_argument(
+    heard = parser.add_argument_group("where to listen, and how long")
+    heard.add_argument(
         "addresses",
         nargs="*",
         metavar="URL",
-        help="listen at these addresses only (default: the usual one of each kind of device)",
+        help="listen only at these addresses (default: the usual one of each kind of device)",
     )
-    parser.add_argument(
-        "--seconds", type=positive, default=2.0, metavar="N", help="listen for N s (default 2)"
+    heard.add_argument(
+        "--seconds",
+        type=positive,
+        default=2.0,
+        metavar="N",
+        help="listen for N seconds (default: 2)",
     )
-    parser.add_argument(
+    kept = parser.add_argument_group("file to write")
+    kept.add_argument(
         "--json", type=Path, metavar="FILE", help="also write the result to this file"
     )
 

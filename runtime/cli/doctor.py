@@ -5,11 +5,15 @@ from __future__ import annotations
 import argparse
 
 HELP = "check this machine"
+USAGE = "[--warm]"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments and options."""
-    parser.add_argument("--warm", action="store_true", help="compile all kernels ahead of time")
+    ahead = parser.add_argument_group("preparing")
+    ahead.add_argument(
+        "--warm", action="store_true", help="also compile all kernels, so that shows start at once"
+    )
 
 
 def run(options: argparse.Namespace) -> int:

@@ -9,25 +9,28 @@ from runtime.cli.options.arguments import size
 from runtime.cli.options.show_options import add_character_option
 
 HELP = "draw the paper's figures on squash and stretch, or pictures of the window"
+USAGE = "DIR [OPTIONS]"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments and options."""
-    parser.add_argument("folder", type=Path, metavar="DIR", help="folder for the pictures")
-    parser.add_argument(
+    needed = parser.add_argument_group("needed")
+    needed.add_argument("folder", type=Path, metavar="DIR", help="the folder for the pictures")
+    drawn = parser.add_argument_group("what is drawn")
+    drawn.add_argument(
         "--of",
         choices=("paper", "window"),
         default="paper",
-        help="what is drawn: the paper's figures 5 to 7 (default), or the window at work",
+        help="the paper's figures 5 to 7, or the window at work (default: paper)",
     )
-    parser.add_argument(
+    drawn.add_argument(
         "--size",
         type=size,
         metavar="WxH",
-        help="width and height in pixels of a row of the paper's figures (default 1500x420), or of "
-        "the window (default 1280x720)",
+        help="width and height in pixels of a row of the paper's figures (default: 1500x420) or "
+        "of the window (default: 1280x720)",
     )
-    add_character_option(parser, required=False)
+    add_character_option(drawn, default="cactus; the window has its own")
 
 
 def run(options: argparse.Namespace) -> int:

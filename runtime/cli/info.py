@@ -8,11 +8,13 @@ from pathlib import Path
 from runtime.cli.options.input_options import add_input_options, stated
 
 HELP = "show what a recording, a character or a session contains"
+USAGE = "FILE [OPTIONS]"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments and options."""
-    parser.add_argument(
+    needed = parser.add_argument_group("needed")
+    needed.add_argument(
         "file",
         metavar="FILE",
         help="a recording, a mesh, a rig, a session, or the name of a built-in character",

@@ -7,16 +7,18 @@ import argparse
 from runtime.cli.options.show_options import add_character_option, add_show_options
 
 HELP = "drive characters with a live performer"
+USAGE = "--device URL --character C [OPTIONS]"
 CAMERA = "webcam://"
 FILM = "webcam:///"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments and options."""
-    parser.add_argument(
+    needed = parser.add_argument_group("needed")
+    needed.add_argument(
         "--device", required=True, metavar="URL", help="the device; `bunraku devices` lists them"
     )
-    add_character_option(parser, required=True)
+    add_character_option(needed)
     add_show_options(parser)
 
 

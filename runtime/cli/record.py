@@ -18,16 +18,21 @@ if TYPE_CHECKING:
     from replay.recorder import Recorder
 
 HELP = "record a live performer, without a character"
+USAGE = "OUT.mcap --device URL [--seconds N]"
 POLLS = 240.0  # a second: twice the rate of the fastest sensor
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments and options."""
-    parser.add_argument(
+    needed = parser.add_argument_group("needed")
+    needed.add_argument("out", type=Path, metavar="OUT.mcap", help="the file to write")
+    needed.add_argument(
         "--device", required=True, metavar="URL", help="the device; `bunraku devices` lists them"
     )
-    parser.add_argument("out", type=Path, metavar="OUT.mcap", help="the file to write")
-    parser.add_argument("--seconds", type=positive, metavar="N", help="stop after N s")
+    time = parser.add_argument_group("time")
+    time.add_argument(
+        "--seconds", type=positive, metavar="N", help="stop after N seconds (default: at Ctrl-C)"
+    )
 
 
 def run(options: argparse.Namespace) -> int:

@@ -6,17 +6,26 @@ import argparse
 from pathlib import Path
 
 from runtime.cli.options.input_options import add_input_options, stated
-from runtime.cli.options.show_options import add_character_option, add_show_options
+from runtime.cli.options.show_options import (
+    add_character_option,
+    add_playback_options,
+    add_show_options,
+)
 
 HELP = "drive characters with a recording"
+USAGE = "RECORDING --character C [OPTIONS]"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments and options."""
-    parser.add_argument("recording", type=Path, metavar="RECORDING", help="any recording")
-    add_character_option(parser, required=True)
-    add_input_options(parser)
+    needed = parser.add_argument_group("needed")
+    needed.add_argument(
+        "recording", type=Path, metavar="RECORDING", help="a file; docs/recordings.md lists formats"
+    )
+    add_character_option(needed)
+    add_playback_options(parser)
     add_show_options(parser)
+    add_input_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:

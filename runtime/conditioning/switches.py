@@ -57,7 +57,10 @@ STEPS: Mapping[str, tuple[str, str]] = {
         "Leave out late frames",
         "drop late and duplicate frames, and go on where a clock jumps",
     ),
-    "identities": ("Tell people apart", "know somebody who comes back under a new number"),
+    "identities": (
+        "Tell people apart",
+        "recognise a performer to whom the sensor gives a new number",
+    ),
     "swaps": ("Put swapped limbs right", "correct limbs whose left and right are exchanged"),
     "outliers": ("Leave out wild jumps", "ignore joints that jump and bones that stretch"),
     "filter": ("Smooth trembling", "smooth every joint (One-Euro)"),

@@ -14,31 +14,36 @@ if TYPE_CHECKING:
 def add_input_options(parser: argparse.ArgumentParser) -> None:
     """Add the options of every command that reads a recording."""
     said = parser.add_argument_group(
-        "what the recording's file leaves open",
-        "Without these it is guessed; `bunraku info` shows every guess as a note.",
+        "what the recording's file does not say",
+        "What the file does not say is guessed; `bunraku info` shows each guess as a note.",
     )
     said.add_argument(
-        "--fps-input", type=positive, metavar="N", help="its frames per second, instead of times"
+        "--fps-input",
+        type=positive,
+        metavar="N",
+        help="frames per second, in place of the times in the file",
     )
     said.add_argument(
         "--up-input",
         type=_plain,
         metavar="AXIS",
-        help="which of its axes points up: x, y, z; or -x, -y, -z, as in --up-input=-z",
+        help="the axis that points up: x, y, z, -x, -y or -z, as in --up-input=-z",
     )
     said.add_argument(
         "--unit-input",
         type=_plain,
         metavar="UNIT",
-        help="its unit of length: m, dm, cm, mm, in or ft",
+        help="the unit of length: m, dm, cm, mm, in or ft",
     )
     said.add_argument(
-        "--mirror-input", action="store_true", help="it shows the performer as in a mirror"
+        "--mirror-input",
+        action="store_true",
+        help="the recording shows the performer as in a mirror",
     )
     said.add_argument(
         "--animation-input",
         metavar="NAME",
-        help="which animation of a glTF file is played: its name, or its number from 1",
+        help="the animation of a glTF file to play: its name, or its number from 1",
     )
 
 

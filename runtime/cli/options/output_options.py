@@ -36,8 +36,8 @@ def sender_settings(options: argparse.Namespace) -> SenderSettings:
 
 def add_file_options(
     parser: argparse.ArgumentParser, *, export_within: float | None = None
-) -> None:
-    """Add the options that write files.
+) -> argparse._ArgumentGroup:
+    """Add the options that write files of what is performed; return their group.
 
     Args:
         parser: of the command.
@@ -49,65 +49,76 @@ def add_file_options(
         action=Once,
         type=Path,
         metavar="OUT.mp4",
-        help="the pictures as a video: mp4, m4v, mov, mkv or webm",
+        help="write a video: mp4, m4v, mov, mkv or webm",
     )
     keep.add_argument(
         "--fps",
         type=positive,
         default=60.0,
         metavar="X",
-        help="pictures per second of videos and cameras, at most (default 60; demo 30)",
+        help="the most pictures per second of videos and cameras (default: %(default)g)",
     )
-    keep.add_argument("--frames", action=Once, type=Path, metavar="DIR", help="a PNG of each frame")
+    keep.add_argument(
+        "--frames",
+        action=Once,
+        type=Path,
+        metavar="DIR",
+        help="write a PNG of each frame to this folder",
+    )
     keep.add_argument(
         "--cache",
         action=Once,
         type=Path,
         metavar="OUT.pc2",
-        help="the deformed vertices of each frame",
+        help="write the deformed vertices of each frame",
     )
     keep.add_argument(
         "--report",
         action=Once,
         type=Path,
         metavar="OUT.json",
-        help="match, times and quality in figures",
-    )
-    keep.add_argument(
-        "--record",
-        action=Once,
-        type=Path,
-        metavar="OUT.mcap",
-        help="the performer's frames as they arrived",
+        help="write figures of the match, the times and the quality",
     )
     keep.add_argument(
         "--export",
         action=Once,
         type=Path,
         metavar="OUT.{glb,usdc,usda,bvh}",
-        help="the performed character, for other programs",
+        help="write the performed character for other programs",
     )
     keep.add_argument(
         "--export-within",
         type=share_or_rigid,
         default=export_within,
         metavar="SHARE",
-        help="how far the surface of a .glb or a joint of a .bvh may be from where it was "
-        "performed, as a share of the height, such as 1e-4: morph targets correct the skin, and "
-        "joints slide; or `rigid`: a skin alone, and rigid bones "
+        help="the farthest that the surface of a .glb or a joint of a .bvh may be from where it "
+        "was performed, as a share of the height: morph targets correct the skin, and joints "
+        "slide; rigid: only a skin and rigid bones "
         f"(default: {'rigid' if export_within is None else export_within})",
+    )
+    return keep
+
+
+def add_record_option(group: argparse._ArgumentGroup) -> None:
+    """Add the option that records a performer, for commands that have one."""
+    group.add_argument(
+        "--record",
+        action=Once,
+        type=Path,
+        metavar="OUT.mcap",
+        help="write the performer's frames as they arrived",
     )
 
 
 def add_sender_options(parser: argparse.ArgumentParser) -> None:
     """Add the options that send to other programs."""
-    send = parser.add_argument_group("sending to other programs")
+    send = parser.add_argument_group("other programs that receive the show")
     send.add_argument(
         "--virtual-camera",
         nargs="?",
         const="",
         metavar="NAME",
-        help="send the pictures to this virtual camera, or to the first one if NAME is missing",
+        help="send the pictures to this virtual camera; without NAME to the first one",
     )
     send.add_argument(
         "--ndi", metavar="NAME", help="send the pictures over the network under this NDI name"
@@ -122,16 +133,17 @@ def add_sender_options(parser: argparse.ArgumentParser) -> None:
         "--vmc",
         type=host_port,
         metavar="HOST:PORT",
-        help="send the first performer as VMC (default port 39539)",
+        help="send the first performer as VMC (default port: 39539)",
     )
     send.add_argument(
         "--publish",
         metavar="tcp://HOST:PORT",
-        help="publish the performers for other shows, which open zmq+tcp://HOST:PORT",
+        help="publish the performers for other shows, whose --device is zmq+tcp://HOST:PORT",
     )
     send.add_argument(
         "--publish-keys",
         type=Path,
         metavar="DIR",
-        help="keys for --publish to other machines; `bunraku bridge --make-keys DIR` makes them",
+        help="the keys that --publish needs for other machines; `bunraku bridge --make-keys DIR` "
+        "makes them",
     )

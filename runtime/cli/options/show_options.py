@@ -21,11 +21,12 @@ from runtime.cli.options.arguments import (
 )
 from runtime.cli.options.output_options import (
     add_file_options,
+    add_record_option,
     add_sender_options,
     file_settings,
     sender_settings,
 )
-from runtime.conditioning.switches import STEPS, SWITCHES
+from runtime.conditioning.switches import STEPS, SWITCHES, for_live, for_recording
 from runtime.render.background import NOTHING, Background
 from runtime.show.settings import (
     DRIVES,
@@ -36,39 +37,48 @@ from runtime.show.settings import (
     ShowSettings,
 )
 
-USUALLY = {
-    "filter": "; off by default for recordings",
-    "predict": "; off by default",
-    "level": "; off by default for recordings",
-    "mirror": "; off by default",
-    "scale": "; off by default for recordings",
-    "recalibrate": "; off by default",
-}
-"""When a switch of the conditioning is off, unless it is asked for."""
 
+def add_character_option(group: argparse._ActionsContainer, *, default: str | None = None) -> None:
+    """Add the option that names the characters.
 
-def add_character_option(parser: argparse.ArgumentParser, *, required: bool) -> None:
-    """Add the option that names the characters."""
-    parser.add_argument(
+    Args:
+        group: of a command's options.
+        default: what the help says of a command without the option; None where it must be given.
+    """
+    group.add_argument(
         "--character",
         action="append",
-        required=required,
+        required=default is None,
         metavar="C",
-        help="a mesh (obj, ply, stl, off, mesh, glb, gltf, vrm) or a built-in character; may be "
-        "repeated",
+        help="a file (obj, ply, stl, off, mesh, glb, gltf, vrm) or a built-in character; repeat "
+        f"the option for several{'' if default is None else f' (default: {default})'}",
     )
 
 
 def add_show_options(parser: argparse.ArgumentParser) -> None:
     """Add every option of a show."""
-    _add_stage(parser)
-    _add_remote(parser)
-    _add_conditioning(parser)
+    _add_window(parser)
+    add_picture_options(parser)
     _add_driving(parser)
     _add_match(parser)
     _add_deformation(parser)
-    add_file_options(parser)
+    _add_conditioning(parser)
+    add_record_option(add_file_options(parser))
     add_sender_options(parser)
+    _add_remote(parser)
+
+
+def add_playback_options(parser: argparse.ArgumentParser) -> None:
+    """Add the options of how a recording is played."""
+    played = parser.add_argument_group("how the recording is played")
+    played.add_argument(
+        "--speed",
+        type=positive,
+        default=1.0,
+        metavar="X",
+        help="play X times as fast as it was recorded (default: 1)",
+    )
+    played.add_argument("--loop", action="store_true", help="start again after the last frame")
 
 
 def show_settings(options: argparse.Namespace, origin: str) -> ShowSettings:
@@ -163,8 +173,8 @@ def _remote(options: argparse.Namespace) -> RemoteSettings | None:
     return RemoteSettings(options.remote, options.remote_feedback)
 
 
-def _add_stage(parser: argparse.ArgumentParser) -> None:
-    show = parser.add_argument_group("the show")
+def _add_window(parser: argparse.ArgumentParser) -> None:
+    show = parser.add_argument_group("the window")
     show.add_argument("--headless", action="store_true", help="open no window")
     show.add_argument(
         "--fast",
@@ -172,16 +182,10 @@ def _add_stage(parser: argparse.ArgumentParser) -> None:
         help="perform every frame exactly once, as fast as possible",
     )
     show.add_argument(
-        "--speed",
-        type=positive,
-        default=1.0,
-        metavar="X",
-        help="play a recording X times as fast as it was recorded (default 1)",
+        "--plain",
+        action="store_true",
+        help="draw neither the matched chains nor the performer's small picture",
     )
-    show.add_argument(
-        "--loop", action="store_true", help="start a recording again after its last frame"
-    )
-    add_picture_options(parser)
 
 
 def add_picture_options(parser: argparse.ArgumentParser) -> None:
@@ -190,25 +194,20 @@ def add_picture_options(parser: argparse.ArgumentParser) -> None:
     show.add_argument(
         "--size",
         type=size,
-        default=(960, 540),
+        default="960x540",
         metavar="WxH",
-        help="width and height of the picture in pixels (default 960x540; demo 1280x560)",
+        help="width and height of the picture in pixels (default: %(default)s)",
     )
     behind = show.add_mutually_exclusive_group()
     behind.add_argument(
-        "--transparent", action="store_true", help="draw no stage behind the characters"
+        "--transparent", action="store_true", help="draw nothing behind the characters"
     )
     behind.add_argument(
         "--background",
         type=colour,
-        metavar="COLOUR|chroma",
-        help="draw a plain colour such as #203040 in place of the stage; chroma is a green that is "
-        "easy to key out",
-    )
-    show.add_argument(
-        "--plain",
-        action="store_true",
-        help="draw neither the matched chains nor the performer's small picture",
+        metavar="COLOUR",
+        help="draw this colour behind the characters: #203040, or chroma, a green that is easy to "
+        "key out (default: the stage)",
     )
 
 
@@ -218,133 +217,147 @@ def _add_remote(parser: argparse.ArgumentParser) -> None:
         "--remote",
         type=remote_address,
         metavar="HOST:PORT",
-        help="accept OSC messages at this address: 127.0.0.1:9100 for programs on this machine, "
-        "0.0.0.0:9100 for a phone",
+        help="accept OSC messages at this address: 127.0.0.1:9100 from programs on this machine, "
+        "0.0.0.0:9100 also from a phone",
     )
     show.add_argument(
         "--remote-feedback",
         type=port_number,
         metavar="PORT",
-        help="send states to this port of the phone (default: the port that it sends from)",
+        help="answer to this port of the phone (default: the port that it sends from)",
     )
 
 
 def _add_conditioning(parser: argparse.ArgumentParser) -> None:
     stream = parser.add_argument_group("corrections of the performer's frames")
     for name, (label, text) in STEPS.items():
-        said = f"{label}: {text}{USUALLY.get(name, '')}"
-        stream.add_argument(f"--{name}", action=argparse.BooleanOptionalAction, help=said)
+        stream.add_argument(
+            f"--{name}",
+            action=argparse.BooleanOptionalAction,
+            help=f"{label}: {text} (default: {_usual(name)})",
+        )
+
+
+def _usual(name: str) -> str:
+    """Where a correction is on, unless an option says otherwise."""
+    live, recorded = getattr(for_live(), name), getattr(for_recording(), name)
+    if name == "mirror":
+        return "on for webcams, else off"
+    if live != recorded:
+        return "on, but off for recordings"
+    return "on" if live else "off"
 
 
 def _add_driving(parser: argparse.ArgumentParser) -> None:
-    drive = parser.add_argument_group("who drives, and how the characters follow")
+    drive = parser.add_argument_group("how performers drive characters")
     drive.add_argument(
         "--source",
         default="whole",
-        metavar="PRESET|JOINTS",
+        metavar="PART",
         help="the part of the performer that drives: whole, upper, arms, legs, left-arm, "
-        "right-arm, hand, ... or joint names separated by commas (default whole)",
+        "right-arm, hand, ..., or joint names with commas between them (default: whole)",
     )
     drive.add_argument(
         "--drive",
         choices=DRIVES,
         default="auto",
-        help="how a character follows: absolute points each limb where the performer's points, "
-        "relative turns matched chains from a rest pose, auto (default) is absolute where both "
-        "have such limbs",
+        help="absolute: each limb points where the performer's limb points; relative: matched "
+        "chains turn from a rest pose; auto: absolute where both bodies have such limbs, else "
+        "relative (default: auto)",
     )
     drive.add_argument(
         "--in-place",
         action="store_true",
-        help="let characters stay where they are; else they travel as their performers do",
+        help="keep the characters where they are (default: they travel as their performers do)",
     )
     drive.add_argument(
         "--performers",
         type=counting,
         default=1,
         metavar="N",
-        help="number of performers: performer K drives character K, and the last performer also "
-        "drives all remaining characters (default 1)",
+        help="the number of performers; performer K drives character K, and the last one also "
+        "drives all remaining characters (default: 1)",
     )
 
 
 def _add_match(parser: argparse.ArgumentParser) -> None:
     match = parser.add_argument_group(
-        "matching chains of the performer to the characters",
-        "All but --iterations choose matched chains also for bodies that else follow limb by limb.",
+        "how performers are matched to characters",
+        "With --drive auto, each of these but --countdown selects matched chains.",
     )
     match.add_argument(
         "--match",
         type=counting,
         default=1,
         metavar="N",
-        help="use the N-th best match (default 1)",
+        help="use the N-th best match (default: 1)",
     )
     match.add_argument(
         "--countdown",
         type=seconds_or_never,
         metavar="S|never",
-        help="seconds that a performer keeps still before the match shown performs; never waits "
-        "for Enter (default 3; a recording starts at once)",
+        help="start when the performer has kept still for S seconds, or never before Enter is "
+        "pressed (default: 3, or 1 without a window; a recording starts at once)",
     )
     match.add_argument(
         "--mapping",
         type=Path,
         metavar="FILE.json",
-        help="use the pairs of joints and nodes in this file; see docs/mapping.md",
+        help="use the pairs of joints and nodes in this file, which docs/mapping.md describes",
     )
     match.add_argument(
         "--chains",
         choices=("extend", "stop"),
         default="extend",
-        help="drive a matched chain to its longest leaf, or only to the root of the sub-tree "
-        "(default extend)",
+        help="extend: drive a matched chain to its longest leaf; stop: only to the root of the "
+        "matched sub-tree (default: extend)",
     )
     match.add_argument(
-        "--flip", action="store_true", help="mirror the turns by flipping the y-axis"
-    )
-    match.add_argument(
-        "--iterations",
-        type=counting,
-        default=2,
-        metavar="N",
-        help="ARAP iterations per frame; if N is 2 or more, the last one runs after the frame is "
-        "shown (default 2)",
+        "--flip", action="store_true", help="flip the y-axis, which mirrors the turns"
     )
 
 
 def _add_deformation(parser: argparse.ArgumentParser) -> None:
     made = parser.add_argument_group(
-        "deformation of the characters",
-        "Each option may be repeated, once for each character; the last value also applies to all "
-        "remaining characters.",
+        "how characters deform",
+        "Repeat an option to give each character its own value; the last value applies to all "
+        "remaining characters. --iterations is for all characters.",
     )
     made.add_argument(
         "--cartoon",
         action="append",
         type=share,
         metavar="X",
-        help="0 (default) keeps every part rigid, 1 lets it squash and stretch with its motion",
+        help="0 keeps every part rigid, 1 lets it squash and stretch with its motion (default: 0)",
     )
     made.add_argument(
         "--volume-gain",
         action="append",
         type=gain,
         metavar="X",
-        help="share of the volume lost while a part squashes and stretches that is restored; more "
-        "than 1 exaggerates (default 1)",
+        help="restore this share of the volume that a part loses while it squashes and stretches; "
+        "more than 1 exaggerates (default: 1)",
     )
     made.add_argument(
         "--stiffness",
         action="append",
         type=stiffness,
         metavar="X",
-        help="0 (default) lets limbs bend along their whole length; the nearer to 1, the more they "
-        "bend at their joints only",
+        help="0 lets limbs bend along their whole length; the nearer to 1, the more they bend only "
+        "at their joints (default: 0)",
     )
     made.add_argument(
         "--energy",
         action="append",
         choices=ENERGIES,
-        help="what the solver keeps as rigid as possible (default spokes); see docs/deformation.md",
+        help="what the solver keeps as rigid as possible; docs/deformation.md describes each "
+        "(default: spokes)",
+    )
+    made.add_argument(
+        "--iterations",
+        type=counting,
+        default=2,
+        metavar="N",
+        help="iterations of the solver per frame; of several, the last runs after the frame is "
+        "shown (default: 2)",
     )

@@ -12,23 +12,27 @@ if TYPE_CHECKING:
     from runtime.session.document import Session
 
 HELP = "change a session by a list of edits"
+USAGE = "SESSION.bunraku [--script EDITS.json] [--out OTHER.bunraku]"
 MOST_BYTES = 16 << 20
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments and options."""
-    parser.add_argument("session", type=Path, metavar="SESSION.bunraku")
-    parser.add_argument(
+    needed = parser.add_argument_group("needed")
+    needed.add_argument("session", type=Path, metavar="SESSION.bunraku", help="the session's file")
+    edits = parser.add_argument_group("what is changed")
+    edits.add_argument(
         "--script",
         type=Path,
         metavar="EDITS.json",
-        help='edits such as [{"edit": "move", "clip": 2, "start": 1.5}]; docs/session.md lists all',
+        help='edits such as [{"edit": "move", "clip": 2, "start": 1.5}]; docs/session.md lists all '
+        "(default: only print what the session contains)",
     )
-    parser.add_argument(
+    edits.add_argument(
         "--out",
         type=Path,
         metavar="OTHER.bunraku",
-        help="write the changed session here and leave the first one as it is",
+        help="write the changed session to this new file (default: change SESSION.bunraku)",
     )
 
 

@@ -17,30 +17,42 @@ if TYPE_CHECKING:
 
 EXACT = 1e-4  # of a character's height
 HELP = "write a session's video, pictures and characters"
+USAGE = "SESSION.bunraku [OPTIONS]"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments and options."""
-    parser.add_argument("session", type=Path, metavar="SESSION.bunraku")
+    needed = parser.add_argument_group("needed", "Give at least one file to write, too.")
+    needed.add_argument("session", type=Path, metavar="SESSION.bunraku", help="the session's file")
     part = parser.add_argument_group("the part that is rendered")
     part.add_argument(
-        "--from", dest="start", type=float, default=0.0, metavar="S", help="from this second on"
+        "--from",
+        dest="start",
+        type=float,
+        default=0.0,
+        metavar="S",
+        help="begin at this second of the session (default: 0)",
     )
     part.add_argument(
-        "--to", dest="end", type=float, metavar="S", help="to this second (default: the end)"
+        "--to",
+        dest="end",
+        type=float,
+        metavar="S",
+        help="end at this second (default: the session's end)",
     )
     part.add_argument(
-        "--rate", type=positive, default=60.0, metavar="HZ", help="frames a second (default 60)"
+        "--rate", type=positive, default=60.0, metavar="HZ", help="frames per second (default: 60)"
     )
     add_picture_options(parser)
-    add_file_options(parser, export_within=EXACT)
-    parser.add_argument(
+    files = add_file_options(parser, export_within=EXACT)
+    files.add_argument(
         "--timeline",
         action=Once,
         type=Path,
         metavar="OUT.otio",
-        help="all clips and marks of the session, for editing programs",
+        help="write all clips and marks of the session for editing programs",
     )
+    parser.set_defaults(record=None)  # a session has no performer
 
 
 def run(options: argparse.Namespace) -> int:

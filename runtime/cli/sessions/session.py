@@ -10,7 +10,11 @@ from devices.errors import InputError
 from runtime.cli.live import for_performers, is_camera
 from runtime.cli.options.arguments import Once, digits, positive, seconds
 from runtime.cli.options.input_options import add_input_options, stated
-from runtime.cli.options.show_options import add_character_option, add_show_options
+from runtime.cli.options.show_options import (
+    add_character_option,
+    add_playback_options,
+    add_show_options,
+)
 
 if TYPE_CHECKING:
     from devices.stream import SkeletonStream
@@ -18,63 +22,69 @@ if TYPE_CHECKING:
     from runtime.show.show import Show
 
 HELP = "record takes in layers, play and edit them"
+USAGE = "SESSION.bunraku [--device URL | --recording FILE] [OPTIONS]"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Add the command's arguments and options."""
-    parser.add_argument(
+    needed = parser.add_argument_group("needed")
+    needed.add_argument(
         "session",
         type=Path,
         metavar="SESSION.bunraku",
-        help="the session; a new one is made, with the characters that are given",
+        help="the session's file; a new one is made where there is none, and needs --character",
     )
-    performer = parser.add_mutually_exclusive_group()
+    who = parser.add_argument_group("performer and characters")
+    performer = who.add_mutually_exclusive_group()
     performer.add_argument(
         "--device",
         action=Once,
         metavar="URL",
-        help="a live performer; `bunraku devices` lists the devices",
+        help="a live performer; `bunraku devices` lists the devices (default: nobody)",
     )
     performer.add_argument(
         "--recording",
         action=Once,
         type=Path,
         metavar="FILE",
-        help="a recorded performer, again and again",
+        help="a recorded performer, played again and again; with --fast once",
     )
-    parser.add_argument(
+    add_character_option(who, default="those of the session")
+    take = parser.add_argument_group("takes and time")
+    take.add_argument(
         "--take", action="store_true", help="begin a take as soon as somebody performs"
     )
-    parser.add_argument(
+    take.add_argument(
         "--sound",
         action=Once,
         type=Path,
         metavar="FILE",
         help="takes carry this sound from their first frame on; videos of the session have it",
     )
-    parser.add_argument(
+    take.add_argument(
         "--at",
         type=seconds,
         default=0.0,
         metavar="S",
-        help="let the time stand at this second of the session",
+        help="begin at this second of the session (default: 0)",
     )
-    parser.add_argument(
+    alone = parser.add_argument_group("a show that nobody operates")
+    alone.add_argument(
         "--kiosk",
         type=positive,
         metavar="S",
-        help="nobody operates the show: it plays S seconds after the last performer has left, "
-        "and stops for the next one; full screen, without the panel",
+        help="play the session S seconds after the last performer has left, and stop for the next "
+        "performer; full screen, without the panel",
     )
-    parser.add_argument(
+    alone.add_argument(
         "--pin",
         type=digits,
         metavar="DIGITS",
-        help="with --kiosk: keys and mouse do nothing until these digits are typed",
+        help="with --kiosk: lock keys and mouse until these digits are typed",
     )
-    add_character_option(parser, required=False)
-    add_input_options(parser)
+    add_playback_options(parser)
     add_show_options(parser)
+    add_input_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
