@@ -7,6 +7,9 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
+
+from tests.thorough import THOROUGH
 
 CHECKOUT = Path(__file__).resolve().parents[3]
 
@@ -32,6 +35,7 @@ assert vectors.load.__module__ == "solvers.kernels.array_vectors"
 """
 
 
+@pytest.mark.skipif(not THOROUGH, reason="compiles for 20 s: BUNRAKU_THOROUGH=1 runs it")
 def test_arrays_do_what_vectors_do(tmp_path: Path):
     script = f"{WITHOUT}{SOLVE}\nnp.save(r'{tmp_path / 'answer.npy'}', answer)"
     run = subprocess.run(
