@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 from imgui_bundle import ImVec2, imgui
@@ -37,10 +38,11 @@ def draw_legend(
     top = max(top, margin)
     most = imgui.get_io().display_size.y - above - top
     with card("legend", margin, top, WIDTH * scale, opacity=0.55, most=most):
+        colours = _colours(status.characters)
         for number, character in enumerate(status.characters):
             _draw_name(number, status, controls)
             if number == (controls.match_controls.selected or 0):
-                _draw_parts(character, scale)
+                _draw_parts(character, colours[number], scale)
 
 
 def _draw_name(number: int, status: ShowStatus, controls: ShowControls) -> None:
@@ -57,11 +59,16 @@ def _draw_name(number: int, status: ShowStatus, controls: ShowControls) -> None:
         controls.select(None if selected else number)
 
 
-def _draw_parts(character: CharacterStatus, scale: float) -> None:
+def _colours(characters: Sequence[CharacterStatus]) -> list[list[int]]:
+    """The number of the colour of each character's parts: one for a part of the performer."""
+    numbers = iter(colour_numbers([part.source[1:] for one in characters for part in one.parts]))
+    return [list(itertools.islice(numbers, len(one.parts))) for one in characters]
+
+
+def _draw_parts(character: CharacterStatus, colours: Sequence[int], scale: float) -> None:
     imgui.indent()
     with letters(SMALL):
         imgui.text_disabled(_way(character.parts))
-    colours = colour_numbers([part.source for part in character.parts])
     for number, part in enumerate(character.parts):
         imgui.begin_group()
         dot(_encoded(colours[number]), 5.0 * scale)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Hashable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -41,14 +41,33 @@ class Lights(Protocol):
         ...
 
 
-def colour_numbers(sources: Sequence[Hashable]) -> list[int]:
-    """Return the number of each pair's colour: pairs with one source have one colour."""
-    order = {source: number for number, source in enumerate(dict.fromkeys(sources))}
-    return [order[source] for source in sources]
+def colour_numbers(sources: Sequence[Sequence[int]]) -> list[int]:
+    """Return the number of each pair's colour: one for each part of the performer.
+
+    Two chains are of one part where one of them holds the tip of the other, as an arm to the wrist
+    and an arm to the fingertips do.
+
+    Args:
+        sources: of each pair the joints that drive it, without the one that the chain starts from.
+    """
+    parts: list[tuple[set[int], set[int]]] = []  # of each colour the joints and the tips
+    numbers = []
+    for source in sources:
+        joints, tip = set(source), set(source[-1:])
+        number = next(
+            (n for n, (known, tips) in enumerate(parts) if tip & known or tips & joints),
+            len(parts),
+        )
+        if number == len(parts):
+            parts.append((set(), set()))
+        parts[number][0].update(joints)
+        parts[number][1].update(tip)
+        numbers.append(number)
+    return numbers
 
 
-def pair_colours(sources: Sequence[Hashable]) -> Array:
-    """Return linear RGB (P, 3) of pairs, by what drives each."""
+def pair_colours(sources: Sequence[Sequence[int]]) -> Array:
+    """Return linear RGB (P, 3) of pairs, by the joints that drive each: see `colour_numbers`."""
     numbers = np.array(colour_numbers(sources), dtype=np.int64)
     colours: Array = PAIR_COLOURS[numbers % len(PAIR_COLOURS)]
     return colours

@@ -35,6 +35,8 @@ from solvers.skeleton.widest_view import bones_of, shown_length, widest_view
 if TYPE_CHECKING:
     import moderngl
 
+Colours = NDArray[np.float64]
+
 GAP = 0.18  # [m] of floor between two characters
 BLACKOUT = 0.3  # [s] to black, and back to light
 MARGIN = 0.06  # of the picture on each side that stays free
@@ -61,7 +63,8 @@ class Scene:
         camera: the view of the picture while the characters are at home; it glides after them,
             unless all that they do fits into one picture.
         highlights: whether the drivers' highlights are drawn.
-        focus: the number of the puppet whose colours the inset's performer has.
+        focus: the number of the puppet whose performer the inset shows.
+        performers: the number of each puppet's performer; all follow one at first.
         blackout: 0 for light, 1 for black.
         lights: what lights up in place of the drivers' highlights; None for these.
         seen_by: the camera of the newest picture.
@@ -97,6 +100,7 @@ class Scene:
         self._inset = None if plain else SkeletonInset(*body_bones(performer))
         self.highlights = not plain
         self.focus = 0
+        self.performers: Sequence[int] = [0] * len(puppets)
         self.camera = self.seen_by = front_camera()
         self.lights: Lights | None = None
         self.taken = NOTHING_TAKEN
@@ -224,17 +228,20 @@ class Scene:
         """Draw the uploaded puppets with their highlights, and the performer in the inset."""
         self._pose = pose
         highlights = [puppet.highlights for puppet in self._puppets]
+        colours = _colours_of(highlights)
         for number, own in enumerate(highlights):
-            self._light_up(number, own if self.highlights else [])
+            self._light_up(number, own if self.highlights else [], colours[number])
         if self._inset is not None and pose is not None:
             joints = len(pose.seen)
             if self.lights is not None:
-                colours = self.lights.joint_colours(joints)
+                of_joints = self.lights.joint_colours(joints)
             else:
-                colours = _joint_colours(joints, highlights[self.focus])
+                shown = self.performers[self.focus]
+                followers = [n for n, own in enumerate(self.performers) if own == shown]
+                of_joints = _joint_colours(joints, [(highlights[n], colours[n]) for n in followers])
             self._inset.update(
                 pose.seen,
-                colours=colours,
+                colours=of_joints,
                 dimmed=pose.filled,
                 view_rotation=_side_of(self._puppets[self.focus]),
             )
@@ -248,13 +255,11 @@ class Scene:
         self.seen_by = camera
         self.stage.draw(camera, inset, self._stage_set())
 
-    def _light_up(self, number: int, highlights: Sequence[Highlight]) -> None:
+    def _light_up(self, number: int, highlights: Sequence[Highlight], colours: Colours) -> None:
         """Light up chains of a puppet: its driver's, unless others are to be seen."""
         if self.lights is None:
             chains = [each.points for each in highlights]
-            self._characters[number].highlight(
-                chains, pair_colours([each.joints for each in highlights])
-            )
+            self._characters[number].highlight(chains, colours[: len(chains)])
             return
         lit = self.lights.chains(number)
         self._characters[number].highlight(
@@ -348,10 +353,20 @@ def _side_of(puppet: Puppet) -> NDArray[np.float64] | None:
     return np.array([[cosine, 0.0, sine], [0.0, 1.0, 0.0], [-sine, 0.0, cosine]])
 
 
-def _joint_colours(joints: int, highlights: Sequence[Highlight]) -> NDArray[np.float64]:
-    """Linear RGB of each joint (J, 3): the colour of its highlight; NaN where it has none."""
-    colours = np.full((joints, 3), np.nan)
-    of_pairs = pair_colours([each.joints for each in highlights])
-    for highlight, colour in zip(highlights, of_pairs, strict=True):
-        colours[list(highlight.joints)] = colour
-    return colours
+def _colours_of(highlights: Sequence[Sequence[Highlight]]) -> list[Colours]:
+    """Linear RGB of the highlights of each puppet (H, 3): one for a part of the performer."""
+    colours = pair_colours([each.joints for own in highlights for each in own])
+    ends = np.cumsum([len(own) for own in highlights])[:-1]
+    return list(np.split(colours, ends))
+
+
+def _joint_colours(joints: int, lit: Sequence[tuple[Sequence[Highlight], Colours]]) -> Colours:
+    """Linear RGB of each joint (J, 3): that of its highlight on any puppet; NaN where it has none.
+
+    Where chains of two puppets share a joint, the first puppet's colour counts.
+    """
+    of_joints = np.full((joints, 3), np.nan)
+    for highlights, colours in reversed(lit):
+        for highlight, colour in zip(highlights, colours, strict=True):
+            of_joints[list(highlight.joints)] = colour
+    return of_joints

@@ -64,7 +64,8 @@ class ChainLights:
         return colours
 
     def _colours(self) -> dict[Target, Array]:
-        colours = pair_colours([pair.source for pair in self.pairs])
+        chains = self._pickable.performer.chains
+        colours = pair_colours([chains[pair.source][1:] for pair in self.pairs])
         return {pair.target: own for pair, own in zip(self.pairs, colours, strict=True)}
 
 

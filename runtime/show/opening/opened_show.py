@@ -209,6 +209,8 @@ class OpenedShow:
             puppets = self.puppets[part : None if part == count - 1 else part + 1]
             performer = first if part == 0 else self._performer()
             acts.append(Act(performer, puppets, self._open_match_session(performer, puppets)))
+        if self.scene is not None:
+            self.scene.performers = [part for part, act in enumerate(acts) for _ in act.puppets]
         return acts
 
     def _open_match_session(self, performer: Performer, puppets: list[Puppet]) -> MatchSession:
