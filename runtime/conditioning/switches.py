@@ -59,7 +59,7 @@ STEPS: Mapping[str, tuple[str, str]] = {
     ),
     "identities": (
         "Tell people apart",
-        "recognise a performer to whom the sensor gives a new number",
+        "recognise performers who get a new number",
     ),
     "swaps": ("Put swapped limbs right", "correct limbs whose left and right are exchanged"),
     "outliers": ("Leave out wild jumps", "ignore joints that jump and bones that stretch"),

@@ -60,36 +60,38 @@ def _loop(controls: ShowControls, on: bool) -> None:
 SESSION_ACTIONS: Mapping[str, Action] = {
     "rehearse": Action(
         "Rehearse",
-        "let the performer move the characters again (a session)",
+        "let the performer move the characters (in a session)",
         press=_rehearse,
         words=lambda _: "the performer moves the characters again",
     ),
     "retake": Action(
-        "Retake", "take the newest take away and record it again (a session)", press=_retake
+        "Retake", "remove the newest take and record it again (in a session)", press=_retake
     ),
     "recall": Action(
         "Keep last",
-        "make a take of the last 30 seconds (a session)",
+        "make a take of the last 30 seconds (in a session)",
         press=_with_session(lambda session: session.recall()),
     ),
     "undo": Action(
-        "Undo", "undo the last edit (a session)", press=_with_session(lambda s: s.undo())
+        "Undo", "undo the last edit (in a session)", press=_with_session(lambda s: s.undo())
     ),
     "redo": Action(
-        "Redo", "do again what was undone (a session)", press=_with_session(lambda s: s.redo())
+        "Redo",
+        "redo the last edit that was undone (in a session)",
+        press=_with_session(lambda s: s.redo()),
     ),
     "save": Action(
         "Save", "write the session to its file", press=_with_session(lambda s: s.save())
     ),
     "half-speed": switch(
         "Half speed",
-        "let the session's time go by at half speed, also while a take is recorded",
+        "run the session's time at half speed, also while a take is recorded",
         lambda controls: controls.session is not None and controls.session.transport.speed < 1.0,
         _half_speed,
     ),
     "loop": switch(
         "Loop",
-        "play again from the start at the end, or not",
+        "start again at the end, or stop there",
         lambda controls: controls.playback is not None and controls.playback.loop,
         _loop,
     ),

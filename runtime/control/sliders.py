@@ -68,7 +68,7 @@ SLIDERS: Mapping[str, Slider] = {
         "Squash and stretch",
         "cartoon",
         1.0,
-        "how much characters squash and stretch, from not at all",
+        "how much characters squash and stretch; 0 is not at all",
         "0 %: limbs keep their length",
         "more squash and stretch",
         "less squash and stretch",
@@ -77,7 +77,7 @@ SLIDERS: Mapping[str, Slider] = {
         "Volume",
         "volume_gain",
         2.0,  # the middle of the fader keeps exactly the volume
-        "how much of their volume is kept; more than all of it above the middle",
+        "how much volume characters keep: all of it in the middle, more above it",
         "100 %: keeps its volume exactly",
         "keep more of the volume",
         "keep less of the volume",

@@ -50,42 +50,42 @@ def phase_words(controls: ShowControls) -> str:
 CHOOSING_ACTIONS: Mapping[str, Action] = {
     "map-by-hand": switch(
         "Map by hand",
-        "click the parts of performer and character that belong together, or stop that",
+        "pair parts of performer and character by clicks, or stop",
         lambda controls: controls.chooser.on,
         _choose,
         done=("", "what drove goes on"),
     ),
     "together": switch(
         "All alike",
-        "let a click take all parts that are alike, as the arms of a squid, or only one",
+        "let a click take all parts that are alike, such as a squid's arms, or only one",
         lambda controls: controls.chooser.together,
         _together,
         done=("a click takes all parts that are alike", "a click takes one part"),
     ),
     "clear-pairs": Action(
-        "No pairs", "take all pairs away", press=_clear, words=lambda _: "all pairs are gone"
+        "No pairs", "remove all pairs", press=_clear, words=lambda _: "all pairs are gone"
     ),
     "widest-view": Action(
         "Widest view",
-        "turn to where the most of the character's bones is seen",
+        "turn to where the most bones of the character are seen",
         press=_widest_view,
         words=lambda _: "seen from where it shows the most",
     ),
     "phase": Action(
         "One after the other",
-        "how much later each of several parts follows that one part of the performer drives",
+        "delay between parts that one part of the performer drives",
         write=_set_phase,
         read=lambda controls: min(controls.chooser.phase / MOST_PHASE, 1.0),
     ),
     "phase-up": Action(
         "One after the other +",
-        "let each follow later than the one before",
+        "a longer delay between such parts",
         press=lambda controls: _move_phase(controls, STEP),
         words=phase_words,
     ),
     "phase-down": Action(
         "One after the other -",
-        "let each follow sooner after the one before",
+        "a shorter delay between such parts",
         press=lambda controls: _move_phase(controls, -STEP),
         words=phase_words,
     ),
