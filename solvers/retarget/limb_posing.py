@@ -5,6 +5,11 @@ the direction of the performer's. So the pose does not depend on the rest pose o
 a hand shows which way its palm looks, it takes that orientation whole, and the forearm takes half
 of the twist between them, as radius and ulna do.
 
+The smallest rotation is not defined where a limb points opposite to where it is carried, and near
+there a tremble of the performer's limb would roll the character's by half a turn. So a segment
+rolls at most twice as far as it swings. What is left follows the more slowly the nearer the limb is
+to that place: see `LimbPoser`.
+
 This is absolute retargeting, as in the tools that animators use; the four papers have no section
 for it. `runtime.driving.body.body_driver` says which segments correspond.
 """
@@ -12,6 +17,7 @@ for it. `runtime.driving.body.body_driver` says which segments correspond.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -20,6 +26,7 @@ from numpy.typing import NDArray
 from solvers.kernels.compiled import kernel
 from solvers.kernels.quaternion import (
     Quaternion,
+    Vector,
     between,
     conjugate,
     from_axes,
@@ -42,6 +49,9 @@ BLENDS: Final = -2
 
 _NOTHING: Final = 1e-9  # a length or share below which there is no direction
 _MOST_TWIST: Final = math.radians(270.0)  # of a forearm, before it takes the short way round
+ROLLS: Final = 2.0  # times as far as it swings a segment may roll at once
+SECONDS: Final = 0.1  # [s] in which a segment that points across its own direction rolls on
+LONGEST: Final = 0.25  # [s] between two frames: after a longer gap all is new
 
 
 class LimbRig(NamedTuple):
@@ -87,28 +97,98 @@ def hand_frame(points: Array, near: int, far: int, across: tuple[int, int]) -> A
     return np.array(_hand_frame(np.ascontiguousarray(points), near, far, across[0], across[1]))
 
 
+class _Memory(NamedTuple):
+    """What is kept of the limbs between frames.
+
+    Attributes:
+        twists: (S,) [rad] of the forearms.
+        before: (S, 4) how each segment was turned against what carries it, in the frame before;
+            zero where nothing is known.
+        now: (S, 4) the same of this frame.
+        dt: (1,) [s] since the frame before.
+    """
+
+    twists: Array
+    before: Array
+    now: Array
+    dt: Array
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LimbPoserState:
+    """The memory of a `LimbPoser`: (S,) twists, (S, 4) turns, and the newest time [s] or NaN."""
+
+    twists: Array
+    turns: Array
+    time: float
+
+
+class LimbPoser:
+    """Poses a body frame after frame.
+
+    Args:
+        rig: the body.
+    """
+
+    def __init__(self, rig: LimbRig) -> None:
+        self._rig = rig
+        count = len(rig.near)
+        turns = np.zeros((count, 4)), np.zeros((count, 4))
+        self._memory = _Memory(np.zeros(count), *turns, np.zeros(1))
+        self._time = math.nan
+
+    def reset(self) -> None:
+        """Forget all frames."""
+        self._memory.twists[:], self._memory.now[:] = 0.0, 0.0
+        self._time = math.nan
+
+    def snapshot(self) -> LimbPoserState:
+        """Return a copy of what the next frame depends on."""
+        return LimbPoserState(self._memory.twists.copy(), self._memory.now.copy(), self._time)
+
+    def restore(self, state: LimbPoserState) -> None:
+        """Go back to a snapshot of as many segments."""
+        self._memory.twists[:], self._memory.now[:] = state.twists, state.turns
+        self._time = state.time
+
+    def begin(self, time: float) -> None:
+        """Begin a frame, which may be posed several times.
+
+        Args:
+            time: [s]. If it steps back or leaps ahead, or is NaN, all turns are new.
+        """
+        dt, self._time = time - self._time, time
+        self._memory.before[:] = self._memory.now if 0.0 <= dt <= LONGEST else 0.0
+        self._memory.now[:] = 0.0
+        self._memory.dt[0] = dt
+
+    def pose(
+        self, joints: Array, trunk: Array, given: Array, rotations: Array, positions: Array
+    ) -> None:
+        """Pose the nodes.
+
+        Args:
+            joints: (J, 3) [m] the performer's joints, turned so that both bodies face alike.
+            trunk: (3, 4) world rotations from rest of pelvis, chest and head.
+            given: (S, 4) world rotations from rest of segments; zero where the joints decide.
+            rotations: (K, 4) world rotations from rest of the nodes; overwritten.
+            positions: (K, 3) [m] of the nodes; overwritten.
+        """
+        _pose(self._rig, joints, trunk, given, self._memory, rotations, positions)
+
+
 @kernel
-def pose_limbs(
+def _pose(
     rig: LimbRig,
     joints: Array,
     trunk: Array,
     given: Array,
-    twists: Array,
+    memory: _Memory,
     rotations: Array,
     positions: Array,
 ) -> None:
-    """Pose the nodes.
-
-    Args:
-        rig: the body.
-        joints: (J, 3) [m] the performer's joints, turned so that both bodies face alike.
-        trunk: (3, 4) world rotations from rest of pelvis, chest and head.
-        given: (S, 4) world rotations from rest of segments; zero where the joints decide.
-        twists: (S,) [rad] of the frame before; overwritten.
-        rotations: (K, 4) world rotations from rest of the nodes; overwritten.
-        positions: (K, 3) [m] of the nodes; overwritten.
-    """
     count = len(rig.near)
+    twists = memory.twists
     turns = np.zeros((count, 4))
     for step in range(len(rig.order)):
         node = rig.order[step]
@@ -130,6 +210,8 @@ def pose_limbs(
             turn = quaternion(turns, role)
             if not is_rotation(turn):
                 turn = _turn(rig, role, joints, given, above)
+                if not is_rotation(quaternion(given, role)) and not rig.is_free[role]:
+                    turn = _rolled(turn, point(rig.along, role), above, memory, role)
                 end = rig.twisted_by[role]
                 if end >= 0:
                     twists[role] = _twist(rig, role, end, joints, given, turn, twists[role])
@@ -169,6 +251,33 @@ def _turn(rig: LimbRig, s: int, joints: Array, given: Array, above: Quaternion) 
     carried = rotate(carry, point(rig.along, s))
     swing = between(carried, way, (0.0, 0.0, 1.0))
     return normalized(multiply(swing, carry))
+
+
+@kernel
+def _rolled(
+    turn: Quaternion, along: Vector, above: Quaternion, memory: _Memory, s: int
+) -> Quaternion:
+    """The turn of segment s, rolled about its own direction no faster than it may."""
+    last = quaternion(memory.before, s)
+    if is_rotation(last):
+        way = rotate(turn, along)
+        last = multiply(above, last)
+        aim = rotate(last, along)
+        kept = multiply(between(aim, way, (0.0, 0.0, 1.0)), last)
+        gap = multiply(turn, conjugate(kept))
+        roll = 2.0 * math.atan2(dot((gap[0], gap[1], gap[2]), way), gap[3])
+        roll -= 2.0 * math.pi * math.floor(roll / (2.0 * math.pi) + 0.5)
+        at_once = ROLLS * math.acos(min(max(dot(aim, way), -1.0), 1.0)) + _NOTHING
+        if abs(roll) > at_once:
+            cosine = dot(rotate(above, along), way)
+            far = math.sqrt(max(1.0 - cosine, _NOTHING) / max(1.0 + cosine, _NOTHING))
+            left = (abs(roll) - at_once) * math.exp(-memory.dt[0] / (SECONDS * far))
+            x, y, z = scaled(way, -math.sin(0.5 * math.copysign(left, roll)))
+            turn = normalized(multiply((x, y, z, math.cos(0.5 * left)), turn))
+    own = multiply(conjugate(above), turn)
+    for k in range(4):
+        memory.now[s, k] = own[k]
+    return turn
 
 
 @kernel

@@ -32,7 +32,7 @@ from runtime.driving.root_motion import chain_length
 from runtime.driving.targets import PosedNodes, Targets
 from solvers.retarget.heading import turned
 from solvers.retarget.joint_rotations import RestTurn
-from solvers.retarget.limb_posing import point_hands, pose_limbs
+from solvers.retarget.limb_posing import LimbPoser, LimbPoserState, point_hands
 from solvers.retarget.steady_ends import SteadyEnds, SteadyEndsState
 from solvers.retarget.trunk_turns import UPRIGHT, trunk_turns
 from solvers.skeleton.quaternions import multiply, rotate
@@ -53,7 +53,7 @@ class BodyState:
         origin: (3,) [m] where the performer's hips were when the character began to travel.
         upright: (3, 4) the orientations of the performer's trunk while standing upright.
         trunk: (3, 4) the last turns of pelvis, chest and head.
-        twists: (S,) [rad] of the forearms.
+        limbs: of all limbs.
         nodes: the posed nodes.
         rest_turn: what the performer's rotations mean.
         footing: of the feet.
@@ -64,7 +64,7 @@ class BodyState:
     origin: Array
     upright: Array
     trunk: Array
-    twists: Array
+    limbs: LimbPoserState
     nodes: PosedNodes
     rest_turn: RestTurn | None
     footing: FootingState
@@ -141,7 +141,7 @@ class BodyDriver:
         self._origin: Array | None = None
         self._upright = self._upright_at_rest
         self._trunk = UPRIGHT
-        self._twists = np.zeros(len(parts.rig.near))
+        self._limbs = LimbPoser(parts.rig)
         self._nodes = skeleton.rest_nodes
 
     def _size_ratio(self, upright: Array) -> float:
@@ -178,6 +178,7 @@ class BodyDriver:
         heading = pose.heading if self._goes_along else rest.heading
         joints = turned(pose.seen, self._facing - heading, pose.hips)
         self._ends.steady(joints, pose.time)
+        self._limbs.begin(pose.time)
         if self._held_hands is not None:
             self._held_hands.reach_from_shoulders(joints)
         self._trunk = trunk_turns(joints, self._parts.trunk, self._upright, self._trunk)
@@ -196,18 +197,18 @@ class BodyDriver:
             trunk = self._bearing.of(trunk)
         self._footing.turn_soles(joints, left, pose.time, given)
         self._wings.spread(joints, trunk[1], given)
-        pose_limbs(rig, joints, trunk, given, self._twists, rotations, positions)
+        self._limbs.pose(joints, trunk, given, rotations, positions)
         if self._many_legs is not None:
             self._many_legs.step(joints, positions, rotations, given)
-            pose_limbs(rig, joints, trunk, given, self._twists, rotations, positions)
+            self._limbs.pose(joints, trunk, given, rotations, positions)
         if self._forelegs.follow(joints, self._footing.heights):
             trunk = self._on_forelegs((positions, rotations), joints, trunk, left, given)
         above = self._ratio * self._footing.above
         across = rotate(trunk[1], self._left)
         if self._long_arms.spread_wings(positions, rotations, given, across, above):
-            pose_limbs(rig, joints, trunk, given, self._twists, rotations, positions)
+            self._limbs.pose(joints, trunk, given, rotations, positions)
         if self._long_arms.raise_arms(positions, rotations, given, across, above):
-            pose_limbs(rig, joints, trunk, given, self._twists, rotations, positions)
+            self._limbs.pose(joints, trunk, given, rotations, positions)
         path = self._path(pose, rest, heading, positions)
         plants = self._many_legs is None  # many feet stay where they stand as it is
         if self._goes_along and plants:
@@ -222,7 +223,7 @@ class BodyDriver:
             on_stage=path.on_stage,
             off_stage=path.off_stage,
         ):
-            pose_limbs(rig, joints, trunk, given, self._twists, rotations, positions)
+            self._limbs.pose(joints, trunk, given, rotations, positions)
         self._nodes = PosedNodes(positions, rotations)
         shape = self._skeleton.skinned(self._nodes)
         placement = path.placement(self._footing.clearance(pose))
@@ -240,14 +241,14 @@ class BodyDriver:
             left: (3,) the body's left.
             given: (S, 4) rotations of the segments.
         """
-        rig, (positions, rotations) = self._parts.rig, nodes
+        positions, rotations = nodes
         sinks = self._forelegs.sinks(positions, rotations)
         if sinks != 0.0:
             trunk = pitched(trunk, -sinks * _FORELEGS_REACH, left)
-            pose_limbs(rig, joints, trunk, given, self._twists, rotations, positions)
+            self._limbs.pose(joints, trunk, given, rotations, positions)
         for put in (self._forelegs.plant, self._forelegs.stand):
             put(positions, rotations, given)
-            pose_limbs(rig, joints, trunk, given, self._twists, rotations, positions)
+            self._limbs.pose(joints, trunk, given, rotations, positions)
         return trunk
 
     def _levelled(self, pelvis: Array) -> Array:
@@ -306,7 +307,7 @@ class BodyDriver:
     def reset(self) -> None:
         """Forget the poses before: see `Driver.reset`."""
         self._trunk = UPRIGHT
-        self._twists = np.zeros(len(self._parts.rig.near))
+        self._limbs.reset()
         self._nodes = self._skeleton.rest_nodes
         self._footing.reset()
         self._ends.reset()
@@ -327,7 +328,7 @@ class BodyDriver:
             origin,
             self._upright,
             self._trunk,
-            self._twists.copy(),
+            self._limbs.snapshot(),
             self._nodes,
             self._joint_turns.snapshot(),
             self._footing.snapshot(),
@@ -338,7 +339,8 @@ class BodyDriver:
         """Go back to a snapshot."""
         self._rest, self._trunk, self._nodes = state.rest, state.trunk, state.nodes
         self._origin = None if np.isnan(state.origin).any() else state.origin
-        self._twists, self._upright = state.twists.copy(), state.upright
+        self._upright = state.upright
+        self._limbs.restore(state.limbs)
         self._joint_turns.restore(state.rest_turn)
         self._footing.restore(state.footing)
         self._ends.restore(state.ends)
