@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import coo_array, csr_array
@@ -9,6 +11,9 @@ from scipy.sparse.csgraph import shortest_path
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
+from devices.bodies.body_plan import SIDES
+from devices.bodies.plan_by_names import plan_by_names
+from devices.bodies.rest_heading import rest_heading
 from devices.errors import InputError
 from devices.skeleton import Skeleton
 from runtime.characters.builtin.meshing import level_set, relaxed
@@ -23,9 +28,32 @@ _SIZE = 1.7
 """The rig is scaled to this extent [m] for modelling; the signed distances expect metres."""
 _PROFILE = (0.7, 1.0, 0.92, 0.62)
 """Radius of a limb from joint to joint, over the bone's radius."""
+_SLENDER = 0.5
+"""Radius of a body that is one chain, over that of the trunk of one with limbs."""
+_CHAIN = 0.75  # of the length of all bones: one chain that is longer has no limbs
+_UPRIGHT = 0.8  # cosine to the vertical of a spine that carries a head as a person's does
+_HEAD = (0.13, 0.06, 0.19)
+"""Radius of a head, and the heights of its lower and upper ball above the skull's joint, over the
+length of trunk and neck: of a person whose head is as high as an eighth of the whole."""
+_NOSE = (0.05, 0.05, 0.15)
+"""Radius of a nose, its height above the lower ball, and how far in front of it it ends."""
 _MOST_SAMPLES = 2_000_000
 """About as many points are sampled from the signed distance."""
 _FEWEST, _WANTED, _MOST = 3_000, 5_000, 8_000  # vertices
+
+
+class _Head(NamedTuple):
+    """A head: two bones without joints.
+
+    Attributes:
+        joint: that carries it.
+        points: (3, 3) [m] the lower and the upper end of its axis, and the tip of its nose.
+        radii: (2,) [m] of its axis and its nose.
+    """
+
+    joint: int
+    points: Array
+    radii: Array
 
 
 def body_around(skeleton: Skeleton) -> tuple[Array, Faces, csr_array]:
@@ -47,7 +75,16 @@ def body_around(skeleton: Skeleton) -> tuple[Array, Faces, csr_array]:
     bones = bones[np.linalg.norm(np.diff(positions[bones], axis=1), axis=(1, 2)) > 1e-6]
     if not len(bones):
         raise InputError("all joints of the rig stand at one place; no body fits round it")
-    radii = bone_radii(positions, bones)
+    radii, owners = bone_radii(positions, bones), bones[:, 0]
+    if _is_one_chain(positions, bones):
+        radii *= _SLENDER
+    head = _head(skeleton, positions)
+    if head is not None:
+        count = len(positions)
+        positions = np.concatenate([positions, head.points])
+        bones = np.concatenate([bones, count + np.array([[0, 1], [0, 2]])])
+        radii = np.concatenate([radii, head.radii])
+        owners = np.append(owners, [head.joint, head.joint])
     try:
         vertices, faces = _meshed(positions, bones, radii)
     except ImportError as error:
@@ -55,7 +92,7 @@ def body_around(skeleton: Skeleton) -> tuple[Array, Faces, csr_array]:
             f"a body for a rig without a mesh needs the extra ({error.name}): "
             "pip install 'bunraku[characters]'"
         ) from None
-    owner = bones[_nearest_bone(vertices, positions, bones, radii), 0]
+    owner = owners[_nearest_bone(vertices, positions, bones, radii)]
     ones, rows = np.ones(len(vertices)), np.arange(len(vertices))
     weights = coo_array((ones, (rows, owner)), shape=(len(vertices), len(rest)))
     return vertices / scale + lower, faces, csr_array(weights.tocsr())
@@ -83,13 +120,47 @@ def bone_radii(positions: Array, bones: Bones) -> Array:
     return np.clip(bounded, 0.006 * _SIZE, 0.06 * _SIZE)
 
 
+def _head(skeleton: Skeleton, positions: Array) -> _Head | None:
+    """The head of a body that stands upright, with the joints at (J, 3) [m]; None of any other.
+
+    The bone of a head often ends within it, so that it does not say how large it is.
+    """
+    plan = plan_by_names(skeleton)
+    if plan is None or plan.skull is None or min(len(plan.arms), len(plan.legs)) < len(SIDES):
+        return None
+    skull, hips = positions[plan.skull], positions[plan.hips]
+    tall = float(np.linalg.norm(skull - hips))
+    if not skull[1] - hips[1] > _UPRIGHT * tall > 0.0:
+        return None
+    facing = rest_heading(skeleton, plan)
+    up, front = np.array([0.0, 1.0, 0.0]), np.array([np.sin(facing), 0.0, np.cos(facing)])
+    radius, low, high = tall * np.array(_HEAD)
+    thick, above, ahead = tall * np.array(_NOSE)
+    chin = skull + low * up
+    points = np.array([chin, skull + high * up, chin + above * up + ahead * front])
+    return _Head(plan.skull, points, np.array([radius, thick]))
+
+
+def _is_one_chain(positions: Array, bones: Bones) -> bool:
+    """Whether a body is one chain with short branches at most, as a snake's is."""
+    path = _paths(positions, bones)
+    length = float(np.linalg.norm(np.diff(positions[bones], axis=1), axis=2).sum())
+    return bool(path[np.isfinite(path)].max() > _CHAIN * length)
+
+
+def _paths(positions: Array, bones: Bones) -> Array:
+    """The lengths (J, J) [m] of the ways along the bones; infinite where there is none."""
+    length = np.linalg.norm(positions[bones[:, 1]] - positions[bones[:, 0]], axis=1)
+    count = len(positions)
+    links = coo_array((np.maximum(length, 1e-9), (bones[:, 0], bones[:, 1])), (count, count))
+    paths: Array = shortest_path(links.tocsr(), directed=False)
+    return paths
+
+
 def _room(positions: Array, bones: Bones) -> Array:
     """The distance (b,) from each bone to those near in space and far along the skeleton."""
     start, end = positions[bones[:, 0]], positions[bones[:, 1]]
-    count = len(positions)
-    length = np.maximum(np.linalg.norm(end - start, axis=1), 1e-9)
-    links = coo_array((length, (bones[:, 0], bones[:, 1])), shape=(count, count)).tocsr()
-    path = shortest_path(links, directed=False)  # (J, J)
+    path = _paths(positions, bones)
     along = np.linspace(0.0, 1.0, 7)
     samples = start[:, None] + along[:, None] * (end - start)[:, None]  # (b, 7, 3)
     room = np.full(len(bones), np.inf)
