@@ -36,6 +36,7 @@ class RecordedStream:
 
     def __init__(self, stream: SkeletonStream, keep: Keep | None = None) -> None:
         self.keep = keep
+        self.newest: SkeletonFrame | None = None
         self._stream = stream
         self._tapped = isinstance(stream, Tapped)
         if isinstance(stream, Tapped):
@@ -75,6 +76,6 @@ class RecordedStream:
         self.close()
 
     def _take(self, frame: SkeletonFrame) -> None:
-        keep = self.keep
+        keep, self.newest = self.keep, frame
         if keep is not None:
             keep(frame)

@@ -14,7 +14,14 @@ from runtime.control.by_hand.choosing_actions import CHOOSING_ACTIONS
 from runtime.control.session_actions import SESSION_ACTIONS
 from runtime.control.show_controls import ShowControls
 from runtime.control.sliders import SLIDERS, STEP, Slider
-from runtime.session.session_takes import record_into
+from runtime.control.take_actions import (
+    ACCEPT,
+    TAKE_ACTIONS,
+    end_count_in,
+    is_matching,
+    leave,
+    record,
+)
 
 
 def _slider_actions(name: str, slider: Slider) -> dict[str, Action]:
@@ -56,8 +63,10 @@ def _pause(controls: ShowControls, on: bool) -> None:
     if controls.playback is None:
         controls.notices.show("a live performer cannot be paused: e freezes the characters")
         return
+    if controls.session is not None:
+        end_count_in(controls)
     if controls.session is not None and controls.session.recording:
-        _record(controls, False)
+        record(controls, False)
     elif on:
         controls.playback.pause()
     else:
@@ -69,39 +78,6 @@ def _home(controls: ShowControls) -> None:
         controls.notices.show("a live performer has no start to go back to")
     else:
         controls.playback.seek(0.0)
-
-
-def _is_matching(controls: ShowControls) -> bool:
-    return controls.match_controls.matching
-
-
-def _accept(controls: ShowControls) -> None:
-    if controls.chooser.on:
-        controls.chooser.accept()
-        return
-    if not _is_matching(controls):
-        controls.notices.show("no match is looked for: m looks for one")
-        return
-    controls.match_controls.accept()
-    if _is_matching(controls):
-        controls.notices.show("no pose has been seen yet: step into view")
-    else:
-        controls.notices.show("this match performs now")
-
-
-def _is_recording(controls: ShowControls) -> bool:
-    if controls.session is not None:
-        return controls.session.recording
-    return controls.takes.recording
-
-
-def _record(controls: ShowControls, on: bool) -> None:
-    if controls.session is not None:
-        record_into(controls.session, controls.takes, on)
-    elif on:
-        controls.takes.start()
-    else:
-        controls.takes.stop()
 
 
 def _freeze(controls: ShowControls, on: bool) -> None:
@@ -168,36 +144,15 @@ def _select(controls: ShowControls) -> None:
     controls.notices.show(f"keys are for {which}")
 
 
-def _leave(controls: ShowControls) -> None:
-    """Leave; while something is recorded, only when asked twice.
-
-    While pairs are chosen by hand, leave only that.
-    """
-    if controls.chooser.on:
-        controls.chooser.leave()
-        controls.notices.show("what drove goes on")
-        return
-    running = controls.takes.running
-    if running and not controls.leave_asked.again():
-        names = ", ".join(take.path.name for take in running)
-        controls.notices.show(f"{names} is being recorded: press again to end it and leave")
-        return
-    controls.leaving = True
-
-
 ACTIONS: Mapping[str, Action] = {
     "match-again": Action(
         "Match again",
         "look for a match: strike a pose, and the best one lights up",
         press=lambda controls: controls.match_controls.match_again(),
-        read=lambda controls: float(_is_matching(controls)),
+        read=lambda controls: float(is_matching(controls)),
         words=lambda _: "looking for a match: strike a pose",
     ),
-    "accept": Action(
-        "Use this match",
-        "use the match that lights up, with your present pose as rest pose",
-        press=_accept,
-    ),
+    "accept": ACCEPT,
     "next-match": Action(
         "Next match",
         "light up the next match",
@@ -247,12 +202,7 @@ ACTIONS: Mapping[str, Action] = {
         press=_home,
         words=lambda _: "back at the start",
     ),
-    "record": switch(
-        "Record",
-        "begin or end a take",
-        _is_recording,
-        _record,
-    ),
+    **TAKE_ACTIONS,
     "freeze": switch(
         "Freeze",
         "freeze the characters, or let them move",
@@ -343,7 +293,7 @@ ACTIONS: Mapping[str, Action] = {
     **{name: _conditioning(name, *STEPS[name]) for name in SWITCHES},
     **CHOOSING_ACTIONS,
     **SESSION_ACTIONS,
-    "leave": Action("Leave", "end the show", press=_leave, words=lambda _: "leaving"),
+    "leave": Action("Leave", "end the show", press=leave, words=lambda _: "leaving"),
 }
 """Every action by its name. A new action is one more row, and a key in `runtime.control.keys`."""
 

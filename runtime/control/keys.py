@@ -61,6 +61,7 @@ KEYS = {
     "f2": "save",
     "f3": "loop",
     "f4": "half-speed",
+    "f5": "next-count-in",
     "f6": "map-by-hand",
     "f7": "widest-view",
     "f8": "together",

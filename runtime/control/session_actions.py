@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 
 from runtime.control.action import Action, Do, switch
 from runtime.control.show_controls import ShowControls
+from runtime.control.take_actions import is_recording, record
 from runtime.session.live_session import LiveSession
-from runtime.session.session_takes import record_into
 
 NO_SESSION = "no session is open: start with `bunraku session FILE`"
 
@@ -28,8 +28,8 @@ def _rehearse(controls: ShowControls) -> None:
     session = controls.session
     if session is None:
         controls.notices.show(NO_SESSION)
-    elif session.recording:
-        record_into(session, controls.takes, False)
+    elif is_recording(controls):
+        record(controls, False)
     else:
         session.transport.rehearse()
 
@@ -38,9 +38,9 @@ def _retake(controls: ShowControls) -> None:
     session = controls.session
     if session is None:
         controls.notices.show(NO_SESSION)
-    elif not session.recording:
+    elif not is_recording(controls):
         session.drop_last()
-        record_into(session, controls.takes, True)
+        record(controls, True)
 
 
 def _half_speed(controls: ShowControls, on: bool) -> None:

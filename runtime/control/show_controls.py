@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from replay.playback import Playback
 from runtime.conditioning.switches import Conditioning
 from runtime.control.by_hand.chooser import Chooser
+from runtime.control.count_in import CountIn
 from runtime.puppet.puppet import Puppet
 from runtime.session.live_session import LiveSession
 from runtime.show.act_group import ActGroup
@@ -48,6 +49,7 @@ class ShowControls:
         takes: the recorder of takes.
         notices: what happened last.
         chooser: lets pairs be chosen by hand.
+        count_in: counts seconds down before a take.
         playback: the playback of a recording; None where the stream is live.
         session: the session that is open; None for none.
         scene: the picture; None where no picture is drawn.
@@ -64,6 +66,7 @@ class ShowControls:
     notices: Notices
     chooser: Chooser
     leave_asked: SecondPress
+    count_in: CountIn
     playback: Playback | None = None
     session: LiveSession | None = None
     scene: Scene | None = None

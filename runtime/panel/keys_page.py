@@ -35,6 +35,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
     "Playing": ("hold", "home", "loop", "freeze", "select", "leave"),
     "Recording": (
         "record",
+        "next-count-in",
         "rehearse",
         "undo",
         "redo",
@@ -85,7 +86,7 @@ MOUSE = (
     ("wheel", "Zoom", "go nearer or farther"),
 )
 TRIED = (
-    *((size, columns, True) for size in (1.0, 0.92, 0.84) for columns in (2, 3)),
+    *((size, columns, True) for size in (1.0, 0.92, 0.84, 0.76) for columns in (2, 3)),
     *((size, columns, False) for size in (1.0, 0.92, 0.84) for columns in (2, 3, 4)),
 )
 """What is tried until the page fits: height of letters, columns, and whether texts are shown."""

@@ -5,9 +5,12 @@ from __future__ import annotations
 from imgui_bundle import ImVec2, imgui
 
 from runtime.conditioning.switches import SWITCHES
+from runtime.control.actions import set_value
+from runtime.control.count_in import MOST
 from runtime.control.show_controls import ShowControls
 from runtime.control.sliders import SLIDERS
-from runtime.panel.widgets import card, fader, fitted, heading, switch
+from runtime.control.take_actions import count_in_words
+from runtime.panel.widgets import card, fader, fitted, heading, hint, switch
 
 WIDTH = 250.0  # [px] in a picture of the usual height
 OF_CHARACTERS = ("in-place", "chains")
@@ -30,10 +33,24 @@ def draw_sliders(
         for name in OF_CHARACTERS:
             switch(name, controls)
         imgui.separator()
+        heading("Takes")
+        _draw_count_in(controls)
+        imgui.separator()
         heading("Corrections of the performer")
         for name in SWITCHES:
             switch(name, controls)
     imgui.pop_style_var()
+
+
+def _draw_count_in(controls: ShowControls) -> None:
+    """How long the count-in is, in whole seconds."""
+    seconds = round(controls.count_in.seconds)
+    imgui.text(count_in_words(controls))
+    imgui.set_next_item_width(-1.0)
+    changed, value = imgui.slider_int("##count-in", seconds, 0, round(MOST), "")
+    if changed and value != seconds:
+        set_value("count-in", value / MOST, controls)
+    hint("count-in")
 
 
 def _whose(controls: ShowControls) -> str:

@@ -28,6 +28,7 @@ LEAST = 320.0  # [px] likewise, below which nothing stands beside it
 HEADLINE = 1.65  # times the height of usual letters
 ADVICE = 1.1
 COUNTDOWN = 9.0
+COUNTED = 2.4
 LEAST_DETAILS = 90.0  # [px] in a picture of the usual height
 
 
@@ -78,20 +79,28 @@ def _light(status: ShowStatus) -> Colour:
 
 
 def draw_countdown(status: ShowStatus, scale: float) -> None:
-    """Draw the seconds until the match performs, large, in the middle of the picture."""
+    """Draw the seconds until a take or a match performs, large, in the middle of the picture."""
     left = countdown(status)
     if left is None or left <= 0.0 or status.sighting.sight is not Sight.SEEN:
         return
-    screen = imgui.get_io().display_size
-    text = str(math.ceil(left))
+    fade = 0.35 + 0.65 * (left - math.floor(left))
+    top = 0.16 * imgui.get_io().display_size.y
+    if status.count_in is not None:
+        with letters(COUNTED):
+            top = _draw_large(f"{status.count_in[0].value} in", top, 1.0, scale)
     with letters(COUNTDOWN):
-        size = imgui.calc_text_size(text)
-        fade = 0.35 + 0.65 * (left - math.floor(left))
-        at = ImVec2((screen.x - size.x) / 2.0, 0.16 * screen.y)
-        paint = imgui.get_background_draw_list()
-        shade = imgui.get_color_u32(ImVec4(0.0, 0.0, 0.0, 0.5 * fade))
-        paint.add_text(ImVec2(at.x + 3.0 * scale, at.y + 3.0 * scale), shade, text)
-        paint.add_text(at, imgui.get_color_u32(ImVec4(*PAPER, fade)), text)
+        _draw_large(str(math.ceil(left)), top, fade, scale)
+
+
+def _draw_large(text: str, top: float, opacity: float, scale: float) -> float:
+    """Draw a line with its shadow in the middle of the picture; return where it ends [px]."""
+    size = imgui.calc_text_size(text)
+    at = ImVec2((imgui.get_io().display_size.x - size.x) / 2.0, top)
+    paint = imgui.get_background_draw_list()
+    shade = imgui.get_color_u32(ImVec4(0.0, 0.0, 0.0, 0.5 * opacity))
+    paint.add_text(ImVec2(at.x + 3.0 * scale, at.y + 3.0 * scale), shade, text)
+    paint.add_text(at, imgui.get_color_u32(ImVec4(*PAPER, opacity)), text)
+    return float(top + size.y)
 
 
 def draw_notices(notices: Sequence[Notice], margin: float, scale: float) -> None:

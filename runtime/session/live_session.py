@@ -160,14 +160,20 @@ class LiveSession:
             if one.performs() and self._armed(one.puppet)
         ]
 
-    def record(self) -> bool:
-        """Record the armed characters from the session's time on; return whether one can be."""
-        self._recorded = self.performed
-        if not self._recorded:
+    def stand_by(self) -> bool:
+        """Let performers move the characters where a take is to begin; return whether it can."""
+        if not self.performed:
             self._warn("no performer moves a character that is selected: nothing to record yet")
             return False
-        if self.transport.mode is Mode.PLAYING:
-            self.transport.pause()
+        if not self.recording:
+            self.transport.rehearse()
+        return True
+
+    def record(self) -> bool:
+        """Record the armed characters from the session's time on; return whether one can be."""
+        if not self.stand_by():
+            return False
+        self._recorded = self.performed
         self._start = self.transport.position
         for layers in self._recorded:
             layers.start()

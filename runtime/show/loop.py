@@ -71,6 +71,7 @@ class FrameLoop:
         frozen: whether the characters are frozen. Frames are still received, recorded and
             published. Afterwards the characters blend to the pose of their performer.
         goes_on: whether the show goes on where no performer sends, as while a session plays.
+        before: is called with the time [s] of each frame just before it is performed.
         frames: frames performed so far.
         seconds: performer's time from the first of them to the last [s].
         latency: [s] from the newest frame's arrival until it was handed on to be shown; NaN if its
@@ -93,6 +94,7 @@ class FrameLoop:
     ) -> None:
         self.frozen = False
         self.goes_on: Callable[[], bool] = lambda: False
+        self.before: Callable[[float], None] = lambda _: None
         self.frames = 0
         self.seconds = 0.0
         self.latency = math.nan
@@ -134,6 +136,7 @@ class FrameLoop:
                 if self._watch is not None and arrived.came:
                     self._watch.note()
             if arrived.newest is not None:
+                self.before(arrived.newest.time)
                 self._perform(arrived.newest, arrived.of_slots)
                 self._publish(arrived.newest)
                 self._count(arrived.newest)

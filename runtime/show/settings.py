@@ -10,6 +10,7 @@ from pathlib import Path
 
 from devices.errors import InputError
 from runtime.conditioning.switches import SWITCHES
+from runtime.control.flow_settings import FlowSettings
 from runtime.render.background import Background
 
 LEAST_SIDE, MOST_SIDE = 16, 8192  # pixels of a picture's width and height
@@ -244,6 +245,7 @@ class ShowSettings:
         senders: what to send to other programs.
         remote: remote control by OSC, or None.
         kiosk: of a session that nobody operates; None where somebody does.
+        flow: how the show goes on from one step of the puppeteer to the next.
         origin: where the stream comes from, for the head of recordings: an address or a file name.
 
     Raises:
@@ -265,6 +267,7 @@ class ShowSettings:
     senders: SenderSettings = field(default_factory=SenderSettings)
     remote: RemoteSettings | None = None
     kiosk: KioskSettings | None = None
+    flow: FlowSettings = field(default_factory=FlowSettings)
     origin: str = ""
 
     def __post_init__(self) -> None:

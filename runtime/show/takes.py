@@ -103,7 +103,14 @@ class Takes:
         ]
 
     def start(self) -> None:
-        """Start a take in a new file, unless one is running."""
+        """Start a take in a new file with the next frame, unless one is running."""
+        self._start(None)
+
+    def start_with_newest(self) -> None:
+        """Start a take in a new file with the newest frame that came, unless one is running."""
+        self._start(self._stream.newest)
+
+    def _start(self, first: SkeletonFrame | None) -> None:
         if self.recording or self._too_soon():
             return
         self.stop()
@@ -113,6 +120,8 @@ class Takes:
             self._warn(f"{error}; the show goes on without this take")
             return
         self._since = self._clock()
+        if first is not None:
+            (self._recorder.write if self._waits else self._recorder.offer)(first)
         self._keep()
         self._tell(f"recording to {self._recorder.path}")
 

@@ -4,18 +4,22 @@ from __future__ import annotations
 
 import math
 
+from runtime.control.count_in import Counted
 from runtime.session.transport import Mode
 from runtime.status.choosing_words import choosing_advice, choosing_headline
 from runtime.status.session_words import session_advice, session_headline
 from runtime.status.show_status import CharacterStatus, PerformerStatus, ShowStatus
 from runtime.status.stream_watch import Sight, Sighting
 
+_COUNTED = {
+    Counted.TAKE: "Take your place! r or Escape ends the countdown: no take begins then.",
+    Counted.REST: "Stand as the character rests: the pose at zero counts. Escape ends this.",
+}
+
 
 def headline(status: ShowStatus) -> str:
     """What is seen of the performer, to be read from two metres away."""
-    if status.choosing is not None:
-        return choosing_headline(status.choosing)
-    if status.session is not None and (words := session_headline(status.session)):
+    if words := _headline_of_flow(status):
         return words
     sighting = status.sighting
     if is_paused(status):
@@ -31,6 +35,16 @@ def headline(status: ShowStatus) -> str:
         Sight.LOST: f"Performer lost for {_duration(sighting.seconds)}",
         Sight.ENDED: "The end",
     }[sighting.sight]
+
+
+def _headline_of_flow(status: ShowStatus) -> str:
+    """What is under way, whatever is seen; empty for nothing."""
+    if status.choosing is not None:
+        return choosing_headline(status.choosing)
+    if status.count_in is not None:
+        counted, left = status.count_in
+        return f"{counted.value} in {math.ceil(left)}"
+    return "" if status.session is None else session_headline(status.session)
 
 
 def details(status: ShowStatus) -> str:
@@ -52,6 +66,8 @@ def advice(status: ShowStatus) -> str:
     """What to do next, in one or two sentences."""
     if status.choosing is not None:
         return choosing_advice(status.choosing)
+    if status.count_in is not None:
+        return _COUNTED[status.count_in[0]]
     return _advice_on_show(status)
 
 
@@ -107,7 +123,9 @@ def news(before: Sight, sighting: Sighting, origin: str) -> str:
 
 
 def countdown(status: ShowStatus) -> float | None:
-    """[s] until what is shown performs by itself; None where nothing does."""
+    """[s] until a count-in ends or what is shown performs by itself; None where nothing does."""
+    if status.count_in is not None:
+        return status.count_in[1]
     left = [
         character.countdown
         for character in status.characters

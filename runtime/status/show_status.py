@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 from replay.playback import Playback
+from runtime.control.count_in import Counted, CountIn
 from runtime.driving.choices import Candidate
 from runtime.driving.driver import DrivenPart
 from runtime.driving.performer import Pose
@@ -85,6 +86,7 @@ class ShowStatus:
         session: of the session that is open; None for none.
         performers: who is in view, or was.
         choosing: how far choosing by hand is; None while nothing is chosen.
+        count_in: what is counted down for, and the seconds left; None while nothing is.
     """
 
     origin: str
@@ -97,6 +99,7 @@ class ShowStatus:
     session: SessionStatus | None = None
     performers: Sequence[PerformerStatus] = ()
     choosing: ChoosingStatus | None = None
+    count_in: tuple[Counted, float] | None = None
 
     @property
     def matching(self) -> bool:
@@ -126,6 +129,7 @@ def status_of(
     playback: Playback | None,
     session: LiveSession | None,
     chooser: Choosing,
+    count_in: CountIn,
 ) -> ShowStatus:
     """Return the state of a show as it is now, out of its parts."""
     characters = [status for act in acts for status in _characters(act)]
@@ -147,6 +151,7 @@ def status_of(
         session=None if session is None else session_status(session),
         performers=[_performer(act, act.pose) for act in acts if act.pose is not None],
         choosing=choosing,
+        count_in=None if (counted := count_in.counted) is None else (counted, count_in.left or 0.0),
     )
 
 

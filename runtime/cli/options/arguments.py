@@ -11,6 +11,7 @@ import math
 import re
 import string
 
+from runtime.control.flow_settings import MOST_COUNT_IN
 from runtime.show.settings import LEAST_SIDE, MOST_SIDE, MOST_STIFFNESS, MOST_VOLUME_GAIN
 
 MOST_SECONDS = 3600.0  # of a countdown
@@ -74,6 +75,11 @@ def positive(text: str) -> float:
 def seconds(text: str) -> float:
     """A finite number of seconds from 0."""
     return _between(text, 0.0, MOST_MOMENT)
+
+
+def count_in(text: str) -> float:
+    """A number of seconds of a count-in."""
+    return _between(text, 0.0, MOST_COUNT_IN)
 
 
 def seconds_or_never(text: str) -> float:

@@ -9,6 +9,7 @@ from typing import Any
 from devices.errors import InputError
 from runtime.cli.options.arguments import (
     colour,
+    count_in,
     counting,
     gain,
     port_number,
@@ -27,6 +28,7 @@ from runtime.cli.options.output_options import (
     sender_settings,
 )
 from runtime.conditioning.switches import STEPS, SWITCHES, for_live, for_recording
+from runtime.control.flow_settings import FlowSettings
 from runtime.render.background import NOTHING, Background
 from runtime.show.settings import (
     DRIVES,
@@ -122,6 +124,7 @@ def show_settings(options: argparse.Namespace, origin: str) -> ShowSettings:
         files=file_settings(options),
         senders=sender_settings(options),
         remote=_remote(options),
+        flow=FlowSettings(count_in=options.count_in),
         origin=origin,
     )
 
@@ -298,6 +301,14 @@ def _add_match(parser: argparse.ArgumentParser) -> None:
         metavar="S|never",
         help="start when the performer has kept still for S seconds, or never before Enter is "
         "pressed (default: 3, or 1 without a window; a recording starts at once)",
+    )
+    match.add_argument(
+        "--count-in",
+        type=count_in,
+        default=0.0,
+        metavar="S",
+        help="seconds that are counted before a take begins, and before a match that was accepted "
+        "performs (default 0)",
     )
     match.add_argument(
         "--mapping",

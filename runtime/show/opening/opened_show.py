@@ -13,6 +13,7 @@ from replay.recording import Recording
 from runtime.characters.character import Character
 from runtime.conditioning.switches import asked_for, for_live, for_recording
 from runtime.control.by_hand.chooser import Chooser
+from runtime.control.count_in import CountIn
 from runtime.control.remote import PORT, Remote
 from runtime.control.show_controls import ShowControls, View
 from runtime.driving.drivers import LIMB_BY_LIMB, DriverFactory
@@ -29,7 +30,7 @@ from runtime.session.files.store import SessionStore
 from runtime.session.kiosk import Kiosk
 from runtime.session.live_session import LiveSession
 from runtime.session.open_session import open_session
-from runtime.session.session_takes import record_into
+from runtime.session.session_takes import end_take
 from runtime.show.act_group import Act, ActGroup
 from runtime.show.interrupts import interrupts_deferred
 from runtime.show.loop import FrameLoop
@@ -269,7 +270,9 @@ class OpenedShow:
         session = self._open_session(matching)
         takes = self.written.open_takes(None if session is None else session.recordings)
         if session is not None:
-            self._closing.callback(record_into, session, takes, False)
+            self._closing.callback(end_take, session, takes)
+        count_in = CountIn(self._settings.flow.count_in)
+        self.loop.before = count_in.follow
         return ShowControls(
             match_controls=matching,
             conditioning=self._conditioning,
@@ -287,6 +290,7 @@ class OpenedShow:
                 recorded=self._recording is not None,
             ),
             leave_asked=SecondPress(self._clock),
+            count_in=count_in,
             playback=playback_of(self._stream) if session is None else session.transport,
             scene=self.scene,
             view=View() if self._settings.kiosk is None else View(panel=False, full_screen=True),
@@ -316,4 +320,5 @@ class OpenedShow:
             controls.playback,
             controls.session,
             controls.chooser,
+            controls.count_in,
         )

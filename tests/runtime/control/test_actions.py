@@ -67,7 +67,7 @@ TRIED_HERE = {
     "match-again", "accept", "next-match", "previous-match", "rest-pose", "calibrate", "hold",
     "play", "pause", "home", "record", "freeze", "in-place", "blackout", "frame-all", "chains",
     "select", "keep-match", "front", "panel", "sliders", "help", "full-screen", "audience",
-    "leave", *FADERS, *SESSION_ACTIONS, *CHOOSING_ACTIONS,
+    "count-in", "next-count-in", "leave", *FADERS, *SESSION_ACTIONS, *CHOOSING_ACTIONS,
     *(f"{name}-{way}" for name in FADERS for way in ("up", "down")), *SWITCHES,
 }  # fmt: skip
 

@@ -12,6 +12,7 @@ from devices.errors import InputError
 from runtime.cli import parser
 from runtime.cli.options.output_options import file_settings
 from runtime.cli.options.show_options import show_settings
+from runtime.control.flow_settings import FlowSettings
 from runtime.render.background import NOTHING, Background
 from runtime.show.settings import (
     CharacterSettings,
@@ -52,7 +53,7 @@ def test_every_option_arrives() -> None:
         "--size", "64x48", "--plain", "--background", "#010203", "--fps", "30",
         "--source", "arms", "--performers", "1", "--match", "3", "--mapping", "m.json",
         "--drive", "relative", "--chains", "stop", "--flip", "--in-place", "--volume-gain", "2",
-        "--countdown", "never", "--no-outliers", "--mirror",
+        "--countdown", "never", "--count-in", "5", "--no-outliers", "--mirror",
         "--video", "v.mp4", "--frames", "p", "--cache", "c.pc2", "--report", "r.json",
         "--record", "o.mcap", "--export", "e.glb",
         "--virtual-camera", "--ndi", "n", "--spout", "s", "--vmc", "127.0.0.1:1",
@@ -83,6 +84,7 @@ def test_every_option_arrives() -> None:
         ),
         senders=SenderSettings("", "n", "s", ("127.0.0.1", 1), "tcp://127.0.0.1:2", Path("k")),
         remote=RemoteSettings(("127.0.0.1", 3), 4),
+        flow=FlowSettings(count_in=5.0),
         origin="sim://",
     )
     assert settings_of("--transparent").background == NOTHING
@@ -124,7 +126,7 @@ def test_no_field_of_the_settings_is_forgotten() -> None:
         for made in (show_settings, file_settings)
     )
     for kind in (
-        ShowSettings, MatchSettings, CharacterSettings, FileSettings, SenderSettings
+        ShowSettings, MatchSettings, CharacterSettings, FileSettings, SenderSettings, FlowSettings
     ):  # fmt: skip
         for field in dataclasses.fields(kind):
             is_set = f"{field.name}=" in source
