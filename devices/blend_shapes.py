@@ -1,4 +1,4 @@
-"""Weights of a face's blend shapes by name: what is accepted, and the names of the other side.
+"""Weights of a face's blend shapes by name: checked, and renamed for a mirrored face.
 
 A name is kept as its sender writes it: VRM's ("Joy", "happy"), ARKit's 52 ("jawOpen", also called
 Perfect Sync), or a character's own. `runtime.characters.morphs` knows which of them mean the same.

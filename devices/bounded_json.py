@@ -1,4 +1,4 @@
-"""Parse JSON of a stranger without taking many times its size in memory."""
+"""Parses JSON from untrusted senders without taking many times its size in memory."""
 
 from __future__ import annotations
 

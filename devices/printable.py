@@ -1,4 +1,4 @@
-"""Show a text from a file, an argument or the network, whatever is in it."""
+"""Makes a text from a file, an argument or the network safe to print."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is believed of a recording: bounds of its size, its times and its places."""
+"""Bounds on a recording's size, times and places, checked before it is used."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Replaces the first frames of a recording where they do not belong to what follows.
+"""Replaces the first frames of a recording that do not belong to what follows.
 
 A recorder that starts before its sensor is ready writes a frame without joints, with all joints in
 one point, or in a T pose at the origin. A show that took it for the performer's first pose would

@@ -1,4 +1,4 @@
-"""Formats of motion and characters that are known and not read: what converts them, in a line."""
+"""Known formats of motion and characters that are not read, and the program that converts each."""
 
 from __future__ import annotations
 

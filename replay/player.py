@@ -1,4 +1,4 @@
-"""The player: a recording as a stream that no loop can tell from a live one.
+"""The player: a recording as a stream, with the same methods as a live one.
 
 The player's timeline is recorded time that always rises. Where playback starts again from the
 front, jumps or pauses, recorded times are shifted so that the timeline goes on. A `FrameTiming`

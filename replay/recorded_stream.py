@@ -1,4 +1,4 @@
-"""A stream that passes every frame to a recorder on arrival, however seldom it is polled."""
+"""A stream that passes every frame to a recorder on arrival, even if it is polled rarely."""
 
 from __future__ import annotations
 

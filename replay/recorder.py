@@ -1,4 +1,4 @@
-"""Record the frames of a running show: queue each frame at once, write on a separate thread."""
+"""Records the frames of a running show: queues each frame at once, writes on another thread."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tell the unit of time stamps that a file does not name, from the usual step between them."""
+"""Finds the unit of time stamps that a file does not name, from the usual step between them."""
 
 from __future__ import annotations
 

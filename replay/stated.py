@@ -1,4 +1,4 @@
-"""What a user says of a recording whose file leaves it open: rate, up axis, unit, mirroring."""
+"""What a user says of a recording that its file does not say: rate, up axis, unit, mirroring."""
 
 from __future__ import annotations
 

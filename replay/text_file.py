@@ -1,4 +1,4 @@
-"""The text of a file, whatever program and country wrote it: UTF-8, UTF-16, Shift-JIS, Latin-1."""
+"""Reads text files in any common encoding: UTF-8, UTF-16, Shift-JIS, Latin-1."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Ranks the parts of a character by their similarity to a performer's pose on the screen.
+"""Ranks the parts of a character by their similarity to a performer's pose, seen on the screen.
 
 Source: AniMesh (Jin et al. 2015), section 4.2 and figure 3g.
 

@@ -1,4 +1,4 @@
-"""Find the place of a body before a camera from its shape in metres and its image."""
+"""Finds the place of a body in front of a camera, from its shape in metres and its image."""
 
 from __future__ import annotations
 

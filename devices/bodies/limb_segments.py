@@ -1,4 +1,4 @@
-"""Divide a limb whose joints have no names of their own at its elbow and wrist, or knee and ankle.
+"""Divides a limb whose joints have no names at its elbow and wrist, or knee and ankle.
 
 A limb bends where its rest pose does. A straight one is divided where a human limb is. A head is
 divided from its neck in the same way.

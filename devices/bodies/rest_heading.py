@@ -1,4 +1,4 @@
-"""Which way a body faces at rest, by its plan."""
+"""The direction in which a body faces at rest, from its plan."""
 
 from __future__ import annotations
 

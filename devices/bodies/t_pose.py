@@ -1,4 +1,4 @@
-"""The rest pose of a body whose file has none: a T-pose with the lengths of its own bones."""
+"""Makes a rest pose for a body whose file has none: a T-pose with its own bone lengths."""
 
 from __future__ import annotations
 

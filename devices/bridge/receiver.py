@@ -1,4 +1,4 @@
-"""Protocol state of a subscriber, without sockets: decodes messages to frames and composes calls.
+"""The protocol of a subscriber without sockets: decodes messages to frames, composes requests.
 
 A subscriber sends calls until it is answered, and continues. A call is the greeting, the heartbeat,
 the clock request and the acknowledgement that gives the publisher new credit. A restarted publisher

@@ -1,4 +1,4 @@
-"""ZeroMQ sockets for both ends of a bridge: bounded queues, probes, encryption, reconnection.
+"""ZeroMQ sockets for both ends of a bridge: bounded queues, keep-alive, encryption, reconnection.
 
 Source: https://libzmq.readthedocs.io/en/latest/zmq_setsockopt.html and zmq_socket_monitor.html.
 """

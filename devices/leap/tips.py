@@ -1,4 +1,4 @@
-"""Assign finger tips to fingers in protocols 1 to 5, which name neither fingers nor hands.
+"""Assigns finger tips to fingers in Leap protocols 1 to 5, which name neither fingers nor hands.
 
 The tips of a spread hand, sorted across the palm, are its fingers in order. The outer tip that
 reaches less far forward is the thumb, which also distinguishes the left hand from the right. The

@@ -1,4 +1,4 @@
-"""VMC bone messages in a packet: bone names, plausible poses, and runs of bones read at once."""
+"""VMC bone messages in a packet: bone names, possible poses, and runs of bones read at once."""
 
 from __future__ import annotations
 

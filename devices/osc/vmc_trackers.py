@@ -1,4 +1,4 @@
-"""The bones on which VMC trackers are: from their names, or from the address option."""
+"""The bones that VMC trackers are attached to, from their names or from the address option."""
 
 from __future__ import annotations
 

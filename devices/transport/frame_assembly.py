@@ -1,4 +1,4 @@
-"""Assemble messages to frames in protocols without a frame mark (VMC, VRChat, NI mate)."""
+"""Assembles messages to frames in protocols that do not mark frames (VMC, VRChat, NI mate)."""
 
 from __future__ import annotations
 

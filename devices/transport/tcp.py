@@ -1,4 +1,4 @@
-"""Receive messages as TCP streams: senders connect to us, and a header gives each length.
+"""Receives messages over TCP: senders connect to us, and a header gives each message's length.
 
 One thread reads all connections. Whatever happens on one of them (silence, a reset, an end in the
 middle of a message, invalid bytes) does not affect the others.

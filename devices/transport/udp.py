@@ -1,4 +1,4 @@
-"""Receive messages as UDP datagrams, with bounded processor time even during a flood."""
+"""Receives UDP datagrams, with bounded processor time even during a flood."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""A webcam or a film, without a model file to look for: `webcam://`."""
+"""A webcam or a film as a device, tracked by MediaPipe: `webcam://`."""

@@ -1,4 +1,4 @@
-"""Where a picture shows the hands of people, as tiles of a small picture for the hand model.
+"""Where the hands of people are in a picture, and where they go in the hand model's small picture.
 
 The hand model's detector sees a picture at 192 pixels: the hands of a person who is seen from head
 to foot are a few pixels wide there. So it gets a mosaic of tiles, one around each wrist that the

@@ -1,4 +1,4 @@
-"""Finds people and their hands in pictures by MediaPipe, and writes down their landmarks."""
+"""Finds people and their hands in pictures by MediaPipe, and writes their landmarks."""
 
 from __future__ import annotations
 

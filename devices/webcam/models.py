@@ -1,4 +1,4 @@
-"""The tracker's models: fetched once as a wheel, checked, and kept in the user's folder.
+"""The tracker's models: downloaded once as a wheel, checked, and kept in the user's folder.
 
 MediaPipe's releases from 0.10.31 on hold no models. The wheel of 0.10.21 holds the pose and hand
 models (Apache License 2.0). pip fetches it, so mirrors and proxies that are set up for pip are

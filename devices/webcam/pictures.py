@@ -1,4 +1,4 @@
-"""Pictures from a camera, the newest only, or from a film, one after another, by OpenCV."""
+"""Pictures by OpenCV: only the newest from a camera, one after another from a film."""
 
 from __future__ import annotations
 

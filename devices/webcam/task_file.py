@@ -1,4 +1,4 @@
-"""Files that MediaPipe's tasks read: models in a zip, each with the range of its pixels.
+"""Makes the files that MediaPipe's tasks read: models in a zip, each with its range of pixels.
 
 Source: TensorFlow Lite Metadata's schema (metadata_schema.fbs), and MediaPipe's
 `model_asset_bundle_utils`: members are stored, not compressed.

@@ -1,4 +1,4 @@
-"""The program that tracks people in a webcam's pictures or a film, beside the show.
+"""The program that tracks people in a webcam's pictures or a film, in a process of its own.
 
 It runs in a process of its own, at low priority and on all processor cores but one, so it never
 takes the show's core. It writes the messages of `devices.webcam.messages` to its standard output,

@@ -1,4 +1,4 @@
-"""The tracker's process as the show sees it: started, listened to, ended."""
+"""Starts the tracker's process, reads its messages, and ends it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Read Kinect tables whose columns or rows name the joints, as many small recorders write them.
+"""Reads Kinect tables whose columns or rows name the joints, as many small programs write them.
 
 A row for each frame: columns such as SpineBase_X, or, as Kinect-2-CSV has it, a line of joint names
 and a line of X;Y;Z under each; stamps perhaps once a row or before each joint. Or a row for each

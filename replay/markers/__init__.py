@@ -1,1 +1,1 @@
-"""Recordings of markers on a body (C3D, TRC, tables): which marker is where, and the joints."""
+"""Recordings of markers on a body (C3D, TRC, tables): marker names, and the joints beneath them."""

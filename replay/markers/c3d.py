@@ -1,4 +1,4 @@
-"""Read C3D files, of any processor: the markers of a body.
+"""Reads the markers of a body from C3D files, written by any processor.
 
 The library c3d (0.6) is the peer that tests hold this against. The program does not use it: it
 warns of every file without analogue channels, refuses files whose header and parameters differ in

@@ -1,4 +1,4 @@
-"""The place on a body that a marker's name means, in the marker sets that are common.
+"""The place on a body that each marker's name means, in the common marker sets.
 
 Read are Vicon's Plug-in Gait and its kin (CMU, HDM05), OptiTrack's Baseline and Conventional, the
 sets of OpenSim's models and of OpenCap, the IOR set of Leardini et al. 2007, and the key points of

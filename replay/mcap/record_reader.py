@@ -1,4 +1,4 @@
-"""Read MCAP records from bytes that may be truncated or damaged, with every size bounded.
+"""Reads MCAP records from bytes that may be cut or damaged; every size is bounded.
 
 The library's own readers stop at the first fault (`StreamReader`) or read nothing without a summary
 (`SeekingReader`), and trust every stated length. These functions yield intact records, and report

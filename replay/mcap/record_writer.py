@@ -1,4 +1,4 @@
-"""Write MCAP records to a file that grows by whole records only, with a compact index in memory.
+"""Writes MCAP records to a file that grows by whole records only; a compact index is in memory.
 
 The library's own writer keeps some 800 bytes per chunk until the end, cannot flush an unfinished
 chunk, and leaves half a record behind when the disk is full. This writer keeps the index as the

@@ -1,4 +1,4 @@
-"""Read JSON of MediaPipe landmarks: results of its tasks, of TensorFlow.js, and what people save.
+"""Reads JSON of MediaPipe landmarks: results of its tasks, of TensorFlow.js, and many variants.
 
 A document is a list of frames, an object with such a list or with frames by number, or one object
 per line. A frame is an object with "pose_world_landmarks", "poseLandmarks", "keypoints3D",

@@ -1,4 +1,4 @@
-"""The landmarks that a text file names: people and groups at each moment, and what is said of them.
+"""The landmarks in a text file: people and landmark groups at each moment, with the file's facts.
 
 Groups are "world" (pose [m]), "image" (pose in the image, or in a space that is not named), "left"
 and "right" (hands).

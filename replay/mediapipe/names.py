@@ -1,4 +1,4 @@
-"""What the names of columns and landmarks mean: group, landmark, axis."""
+"""What names of columns and landmarks mean: group, landmark, axis."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Landmarks of other spaces than MediaPipe's: triangulated by FreeMoCap, or turned when saved."""
+"""Landmarks in other spaces than MediaPipe's: triangulated by FreeMoCap, or turned when saved."""
 
 from __future__ import annotations
 

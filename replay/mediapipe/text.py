@@ -1,4 +1,4 @@
-"""Recognise and interpret MediaPipe landmarks in text: which space, unit and image they are of."""
+"""Recognises and interprets MediaPipe landmarks in text: their space, unit and image size."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Readers of what capture studios and laboratories write."""
+"""Readers of recordings by capture studios and laboratories: Acclaim, MVNX, OptiTrack, SMPL."""

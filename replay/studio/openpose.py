@@ -1,4 +1,4 @@
-"""Read OpenPose's key points: flat bodies, of BODY_25 or COCO, from one file or a folder of them.
+"""Reads OpenPose's key points: flat bodies (BODY_25 or COCO), from a file or a folder of files.
 
 Source: OpenPose documentation, "Output Format".
 """

@@ -1,1 +1,1 @@
-"""Parts of the deformation solvers: handles, cells, rotations, volume."""
+"""Parts of the deformation solvers: handles, cells, rotations, volume, skinning."""

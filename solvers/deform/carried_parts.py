@@ -1,4 +1,4 @@
-"""Parts of a surface without a handle, which the nearest group of handles carries rigidly."""
+"""Parts of a surface without handles: the nearest group of handles carries each of them rigidly."""
 
 from __future__ import annotations
 

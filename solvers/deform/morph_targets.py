@@ -1,4 +1,4 @@
-"""Morph targets on a surface that is deformed: the deltas turn with the surface where they are.
+"""Morph targets on a deformed surface: the deltas turn with the surface.
 
 A morph target moves some vertices by deltas that were modelled at rest. On a head that is turned,
 or a cheek that is bent, each delta turns with the surface around its vertex. The rotation there is

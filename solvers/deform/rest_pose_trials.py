@@ -1,4 +1,4 @@
-"""Decides when a solver also tries the rest pose, moved along with the handles, as its start.
+"""Decides when a solver also tries to start from the rest pose, moved along with the handles.
 
 After a jump the last answer may be a bad start. Small steps add up as well: a slow full turn leaves
 a twist behind. So the rest pose is tried after a jump and, while the handles move, every few

@@ -1,4 +1,4 @@
-"""Bones are posed: modelling turns them, and their motion goes on over it."""
+"""Poses the bones of an animated shape: modelling turns them, and their motion continues on top."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""One bone becomes two, and two become one: with their motion divided, shared, or joined."""
+"""Splits one bone in two and joins two into one; their motion is divided, shared, or joined."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Clips are laid on chains of bones, taken off, and read: which clip runs where."""
+"""Puts clips on chains of bones, takes them off, and says which clip runs where."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Bones are cut at any time, and parts come off with their motion."""
+"""Cuts bones at any place and time; the parts that come off keep their motion."""
 
 from __future__ import annotations
 

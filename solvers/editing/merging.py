@@ -1,4 +1,4 @@
-"""One animated part is merged onto a node of another."""
+"""Merges an animated part onto a node of another."""
 
 from __future__ import annotations
 

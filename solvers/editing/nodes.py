@@ -1,4 +1,4 @@
-"""Nodes are added to an animated part, and removed: the total turning stays."""
+"""Adds nodes to an animated part and removes them; the total turning stays the same."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the nodes of a part are at a time: clips sampled, turns composed, bones placed."""
+"""The places of a part's nodes at a time: clips sampled, turns composed, bones placed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Parts are moved, turned, scaled, mirrored, and shifted in time, with their motion."""
+"""Moves, turns, scales, mirrors and time-shifts parts together with their motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Another node of a part becomes its root."""
+"""Makes another node the root of a part."""
 
 from __future__ import annotations
 

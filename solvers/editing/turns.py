@@ -1,4 +1,4 @@
-"""Sequences of turns M A: composed, undone, led by others, and freed of what does nothing."""
+"""Sequences of modelling and animation turns (M A): composed, undone, and shortened."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fall-back for `llvm_vectors` without numba's internals: small arrays, same answers, slower."""
+"""Small arrays in place of `llvm_vectors`, if numba's internals changed: same answers, slower."""
 
 from __future__ import annotations
 

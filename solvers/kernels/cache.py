@@ -1,4 +1,4 @@
-"""Machine code of kernels on disk, found by a hash of everything that it is made from.
+"""Machine code of kernels on disk, found by a hash of everything that it depends on.
 
 One file holds one kernel for one list of argument types. Its name is the hash, so a file is never
 out of date, checkouts with the same kernels share it, and two processes that write it at the same

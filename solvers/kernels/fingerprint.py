@@ -1,4 +1,4 @@
-"""A hash of everything that a kernel's machine code is made from.
+"""A hash of everything that a kernel's machine code depends on.
 
 Numba copies the kernels that a kernel calls into its machine code, and the values of the globals
 that it names. Its own cache compares the file of the kernel alone, so it keeps machine code of

@@ -1,4 +1,4 @@
-"""What numba compiles at length, in short loops for small arrays: an assignment, a median.
+"""Short loops in place of NumPy lines that numba compiles slowly: an assignment, a median.
 
 Numba checks the sizes in `out[:] = values` by code that formats text for an error message, and
 takes a median by a selection of its own: a second of compiling for each kernel with such a line.

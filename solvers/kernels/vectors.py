@@ -1,4 +1,4 @@
-"""Short vectors of numbers as values in kernels: `s += load(array, at, 8) * 2.0`.
+"""Short vectors of numbers in kernels, kept in registers: `s += load(array, at, 8) * 2.0`.
 
 Two modules define them. The first keeps them in registers and needs parts of numba that are not
 public. The second is slower and needs public parts only; it serves where numba has changed.

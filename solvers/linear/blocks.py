@@ -1,4 +1,4 @@
-"""The parts of a block factor: the matrix, its blocks, and which of them are solved at once.
+"""The data of a block factor: the matrix, its blocks, and which blocks are solved at once.
 
 Every part is a named tuple of arrays, so that kernels can take it as one argument.
 """

@@ -1,4 +1,4 @@
-"""Forward and backward substitution with a block factor: the solve of the global step.
+"""Solves with a block factor by forward and backward substitution, for the global step.
 
 The tasks' subtrees are climbed at the same time, then the blocks above them are climbed and
 descended, then the subtrees are descended at the same time.

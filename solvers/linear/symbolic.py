@@ -1,4 +1,4 @@
-"""The blocks of a factor, from the pattern of the matrix alone.
+"""Finds the blocks of a factor from the pattern of the matrix alone (symbolic factorisation).
 
 Symbolic factorisation: which later unknowns each block touches, how much memory its panels take,
 and which subtrees are solved at the same time. None of it depends on the matrix's values.

@@ -1,1 +1,1 @@
-"""Parts of matching and motion transfer: skeleton abstraction, polylines, headings."""
+"""Parts of matching and motion transfer: skeleton abstraction, polylines, limbs, feet, headings."""

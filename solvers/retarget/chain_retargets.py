@@ -1,4 +1,4 @@
-"""Transfers the motions of all chains of a body to a character's chains in one call a frame."""
+"""Transfers the motions of all matched chains to a character in one call per frame."""
 
 from __future__ import annotations
 

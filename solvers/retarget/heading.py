@@ -1,4 +1,4 @@
-"""The direction that a performer faces, which separates turns of the body from motions of limbs.
+"""The direction that a performer faces: it separates turns of the body from motions of limbs.
 
 AniMesh measures the turns of a limb against the capture device. A performer who turns round would
 then swing both arms through the character's body. So the heading is removed from the pose before

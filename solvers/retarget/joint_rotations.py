@@ -1,9 +1,9 @@
-"""Relates the rotations that a stream gives for its joints to a body at rest.
+"""Relates the joint rotations in a stream to a body at rest, whatever the stream's convention.
 
-"Joint to world" is the identity at rest in one file and a quarter turn in the next. One constant
-turn between joint and rest is fitted from the bones of one frame. Where no such turn explains them,
-but the frame is the rest pose itself, each joint's turn is what it has there. Else the rotations
-mean something else and only directions can be used.
+At rest, "joint to world" is the identity in one file and a quarter turn in the next. One constant
+turn between joint and rest is fitted from the bones of one frame. If no such turn explains them,
+but the frame is the rest pose itself, each joint's turn is taken from there. Otherwise the
+rotations mean something else and only directions can be used.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Poses a body so that each of its limbs points where the same limb of another body points.
+"""Poses a body so that each of its limbs points where that limb of another body points.
 
 Each segment of a limb takes the smallest rotation from where the segment before has carried it to
 the direction of the performer's. So the pose does not depend on the rest pose of either body. Where

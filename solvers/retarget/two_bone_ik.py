@@ -1,4 +1,4 @@
-"""Inverse kinematics of a limb of two bones: turns thigh and shin so that the ankle is elsewhere.
+"""Inverse kinematics of two bones: turns thigh and shin so that the ankle reaches its goal.
 
 The triangle of hip, knee and ankle is known by its three sides (law of cosines). The knee stays on
 its own side of the limb, and a limb whose ankle need not move is not turned at all. Goals near full

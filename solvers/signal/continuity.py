@@ -1,4 +1,4 @@
-"""Predicts where tracked points should be, and finds limbs whose names a tracker has exchanged.
+"""Predicts where tracked points should be, and finds limbs whose names a tracker exchanged.
 
 A body obeys inertia; the faults of a tracker do not. A lost point may appear anywhere, and two
 limbs with exchanged names jump to each other's places. Both faults show as a large distance from

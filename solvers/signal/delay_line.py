@@ -1,4 +1,4 @@
-"""Rotations as they were some time ago: what lets alike limbs move one after the other."""
+"""Rotations as they were some time ago, so that like limbs can move one after the other."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Layers of motion on the nodes of a tree: each turns and shifts nodes over the layers below.
+"""Layers of motion on the nodes of a tree: each turns and shifts nodes on top of those below.
 
 A layer turns nodes in the axes of their parents. An overriding layer takes each node a share of the
 way from what the layers below make of it to its own turn; an adding layer puts a share of its own

@@ -1,4 +1,4 @@
-"""Splits a skeleton into chains that a person would point at: arms, tails, trunks, fingers."""
+"""Splits a skeleton into chains that a person can name: arms, tails, trunks, fingers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Joins a limb to the trunk where its tree hangs it on the tip of its partner.
+"""Joins a limb to the trunk if extraction attached it to the tip of the opposite limb.
 
 Feet that touch can make one leg of an extracted skeleton begin at the other one's sole: up to
 its hip, where it ends in the air.

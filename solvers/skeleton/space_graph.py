@@ -1,4 +1,4 @@
-"""The edge graph of a surface: welded, reduced, and joined where its pieces do not touch."""
+"""The edge graph of a surface: welded, reduced, and joined between pieces that do not touch."""
 
 from __future__ import annotations
 

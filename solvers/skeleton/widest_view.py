@@ -1,4 +1,4 @@
-"""The view of a skeleton that shows the most of it: the directions in which its bones lie."""
+"""The view that shows the most of a skeleton, from the directions of its bones."""
 
 from __future__ import annotations
 

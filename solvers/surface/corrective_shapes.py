@@ -1,4 +1,4 @@
-"""A few shapes whose weighted sums give every frame of a moving surface, to a stated distance."""
+"""A few shapes whose weighted sums give each frame of a moving surface to a stated distance."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Reduces a dense surface to fewer of its own vertices, with the same topology, evenly spread.
+"""Reduces a dense surface to fewer of its own vertices: same topology, evenly spread.
 
 The edges collapse in the order of their lengths. A vertex is merged into a neighbour, which stays
 in place, so a handle at a coarse vertex is a handle at the same vertex of the dense surface. An

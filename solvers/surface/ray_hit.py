@@ -1,4 +1,4 @@
-"""Where a ray meets a surface first: what lies under a point of the screen."""
+"""Where a ray first meets a surface: what lies under a point of the screen."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which straight lines a surface blocks: a tree of boxes around its triangles.
+"""Which straight lines a surface blocks, by a tree of boxes around its triangles.
 
 The triangles are put in the order of their centres along a Morton curve and paired up into a full
 binary tree of boxes (Lauterbach et al. 2009, Fast BVH construction on GPUs, section 3, with a fixed

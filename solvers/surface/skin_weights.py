@@ -1,4 +1,4 @@
-"""Fits skin weights, so that a skinned skeleton reproduces a performed surface."""
+"""Fits skin weights with which a skinned skeleton reproduces a performed surface."""
 
 from __future__ import annotations
 

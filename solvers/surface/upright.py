@@ -1,4 +1,4 @@
-"""Estimates from its shape which side of a surface is up and whether it faces backwards.
+"""Estimates from its shape which side of a surface is up, and whether it faces backwards.
 
 Three signs, as in Fu, Cohen-Or, Dror and Sheffer 2008, "Upright Orientation of Man-Made Objects",
 ACM TOG 27(3), section 4: a standing object is stable, it is less symmetric between above and below
