@@ -1,4 +1,4 @@
-"""Benchmark: table 1 of Celikcan et al. 2015, frames a second on surfaces of the paper's sizes.
+"""Benchmark: table 1 of Celikcan et al. 2015, frames per second for surfaces of the paper's sizes.
 
 As in the paper, a frame of rigid deformation has three iterations, and a frame of squash and
 stretch two iterations of the shape state and one of the pose state. Both are timed in turn, under

@@ -1,4 +1,4 @@
-"""Recognise a body whose joints have no names that say what they are, by its shape."""
+"""Recognises the body of a character by its shape, if no names of its joints tell its limbs."""
 
 from __future__ import annotations
 

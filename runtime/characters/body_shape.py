@@ -1,4 +1,4 @@
-"""What the shape of a body says of its limbs: which are legs, which arms, and where is the front.
+"""What the shape of a body shows: which limbs are legs, which are arms, and where the front is.
 
 The rules were found on figures, animals, toys and things from free collections of meshes.
 """

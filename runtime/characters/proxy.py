@@ -1,4 +1,4 @@
-"""The surface that is deformed: a character's own, or a coarse one that its vertices follow."""
+"""The surface that the solver deforms: the character's own, or a coarse one that carries it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tells a sheet from a body: a page with arms drawn on it has no limbs that could leave it."""
+"""Tells a sheet of paper from a body: arms drawn on a page are no limbs."""
 
 from __future__ import annotations
 

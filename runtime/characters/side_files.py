@@ -1,4 +1,4 @@
-"""The files that a character is made of: its own, and those beside it that it names."""
+"""The files of a character: its own file, and the files beside it that it names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Performing a show for the command line, with its progress: for `demo`, `replay` and `live`."""
+"""Performs a show for the commands `demo`, `replay`, `live` and `session`, with its progress."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tells joints that are exact from measured ones: their rotations carry all bones rigidly.
+"""Tells exact joints from measured ones: the rotations of exact joints carry all bones rigidly.
 
 Animations, motion capture on a skeleton and suits turn rigid bones, and joints lie where these end.
 Where a sensor gives rotations at all, bones change their lengths by its noise from frame to frame.

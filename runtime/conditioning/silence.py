@@ -1,4 +1,4 @@
-"""Performers who have gone silent: they count as unseen, so that their characters ease to rest."""
+"""Treats performers whose frames stop as unseen, so that their characters ease to rest."""
 
 from __future__ import annotations
 

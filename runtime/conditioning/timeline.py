@@ -1,4 +1,4 @@
-"""Gives frames times that only rise, whatever packets and clocks do.
+"""Gives frames times that only increase, whatever packets and clocks do.
 
 Duplicate and late frames are dropped. A sender's clock jumps when the sender is started again or
 its clock is set. A jump is recognised by its size, or because frames go on from the new time; the

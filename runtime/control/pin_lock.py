@@ -1,4 +1,4 @@
-"""A lock on the keys and the mouse of a window that nobody is to operate but who knows a PIN."""
+"""Locks the keys and the mouse of a window until a PIN is typed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The actions on the session that is open: takes, undo, and how its time goes by."""
+"""The actions on an open session: takes, undo, and the speed of its time."""
 
 from __future__ import annotations
 

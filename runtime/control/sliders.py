@@ -1,4 +1,4 @@
-"""The sliders: numbers of the characters' surfaces that a puppeteer moves during a show."""
+"""The sliders with which a puppeteer changes how surfaces deform: squash, volume, stiffness."""
 
 from __future__ import annotations
 

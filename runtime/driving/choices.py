@@ -1,4 +1,4 @@
-"""What a puppeteer can choose of the matching, and the match that is shown."""
+"""What a puppeteer has chosen for matching, and the match that is shown."""
 
 from __future__ import annotations
 

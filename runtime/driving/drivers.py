@@ -1,4 +1,4 @@
-"""The table of drivers by name, and what makes one."""
+"""The table of drivers by name, and the choice of the driver that suits."""
 
 from __future__ import annotations
 

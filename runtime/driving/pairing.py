@@ -1,4 +1,4 @@
-"""A performer and a character that are paired: everything that a driver is made from."""
+"""A performer and a character that belong together: everything that a driver is made from."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Names of parts of a body, in words for people."""
+"""Names of body parts in words for people."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A performer: the pose of the whole body in each frame, and the rest state it moves from."""
+"""A performer: the pose of the whole body in each frame, and the rest state."""
 
 from __future__ import annotations
 

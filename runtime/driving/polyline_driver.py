@@ -1,4 +1,4 @@
-"""The driver that carries motion from chains of the performer over to chains of the character.
+"""The driver that transfers motion from chains of the performer to chains of the character.
 
 AniMesh (Jin et al. 2015), section 5: each chain turns from the rest pose of the character as the
 performer's chain turns from the performer's rest state.

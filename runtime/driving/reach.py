@@ -1,4 +1,4 @@
-"""The room that a character takes on the stage: around the place where it is, and on its way."""
+"""The space that a character needs on the stage: around its place, and on its way."""
 
 from __future__ import annotations
 

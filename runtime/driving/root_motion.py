@@ -1,4 +1,4 @@
-"""How far the whole character goes along with the whole performer: turns, and rise and fall."""
+"""How far the whole character turns, rises and falls with the whole performer."""
 
 from __future__ import annotations
 

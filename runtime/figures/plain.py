@@ -1,4 +1,4 @@
-"""Slow reference versions of the papers' equations in NumPy, to compare our solvers with.
+"""Slow reference versions of the papers' equations in NumPy, which our solvers are compared with.
 
 The figures compare our solvers with them: as-rigid-as-possible deformation (Sorkine and
 Alexa 2007), the scaled-shape state (Celikcan et al. 2015, eqs. (4) to (9)), and deformation under

@@ -1,4 +1,4 @@
-"""The bar along the lower border: the buttons, and the line of time of a recording."""
+"""The bar along the lower edge: buttons, and the timeline of a recording."""
 
 from __future__ import annotations
 

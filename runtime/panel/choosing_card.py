@@ -1,4 +1,4 @@
-"""The card above the bar while pairs are chosen by hand: its buttons, and the phase of a group."""
+"""The card above the bar during mapping by hand: its buttons, and the delay within a group."""
 
 from __future__ import annotations
 

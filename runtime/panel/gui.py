@@ -1,4 +1,4 @@
-"""Dear ImGui over one window: its letters, its colours, and the window's input."""
+"""Dear ImGui in one window: its fonts, its colours, and the window's input."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The page of all keys: in groups, in as many columns as fit, with what each does where it fits."""
+"""The page of all keys: in groups, in as many columns as fit, with texts if there is room."""
 
 from __future__ import annotations
 

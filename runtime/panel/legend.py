@@ -1,4 +1,4 @@
-"""The legend below the performer's small picture: what drives what, in its colours."""
+"""The legend below the performer's small picture: what drives what, in the colours on the stage."""
 
 from __future__ import annotations
 

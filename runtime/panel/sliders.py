@@ -1,4 +1,4 @@
-"""The column at the right: sliders and switches."""
+"""The column at the right edge: sliders and switches."""
 
 from __future__ import annotations
 

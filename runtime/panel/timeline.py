@@ -1,4 +1,4 @@
-"""The timeline of a session: takes as bars, one row a layer, with the moment that is shown."""
+"""The timeline of a session: clips as bars, one row per layer, and a line at the present moment."""
 
 from __future__ import annotations
 

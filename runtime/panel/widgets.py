@@ -1,4 +1,4 @@
-"""The few kinds of widgets that the panel is made of; each does an action of the table."""
+"""The widgets of the panel: buttons, switches and sliders that do actions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Blends a character from what is shown to what it does after a live change: it never jumps.
+"""Blends a character from its old pose after a change during the show, so that it never jumps.
 
 Another driver, another match or rest state, and exchanged sides move a character elsewhere at once.
 Each node turns the short way from where it was, as bones do after a freeze; the surface follows the

@@ -1,4 +1,4 @@
-"""The face of a puppet: blend shapes by name become weights of morph targets.
+"""The face of a puppet: named blend shapes become weights of morph targets.
 
 Names that a character has not stand in for others: a performer's ARKit "eyeBlinkLeft" closes half
 of a character's "blink". Rules of expressions are VRM 1's.

@@ -1,4 +1,4 @@
-"""How much of its way over the stage a character goes: all of it, or none where it stays in place.
+"""How far a character travels over the stage with its performer: all of the way, or none.
 
 Between both it is eased, so that no character jumps when a puppeteer changes it.
 """

@@ -1,4 +1,4 @@
-"""From a place in the picture to what lies there: rays from the camera, polylines on the screen."""
+"""Finds what lies at a point of the picture: rays from the camera, polylines on the screen."""
 
 from __future__ import annotations
 

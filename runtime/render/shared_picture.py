@@ -1,4 +1,4 @@
-"""A picture that one OpenGL context draws and another one, which shares its objects, shows."""
+"""A picture that one OpenGL context draws and another one with shared objects shows."""
 
 from __future__ import annotations
 

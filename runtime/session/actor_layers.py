@@ -1,4 +1,4 @@
-"""An actor on the stage: its clips, with what a performer makes of it as one more layer on top."""
+"""Plays an actor of a session: its clips, and the performer's motion as a layer on top."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The document of a session: takes, the clips that play them, and marks, as frozen values.
+"""The document of a session as immutable values: actors, takes, the clips that play them, marks.
 
 Three kinds of time stand in it. The session's own time counts from the start of the timeline; the
 time of a take counts from its first frame; the speed of a clip leads from one to the other. The

@@ -1,4 +1,4 @@
-"""A show that nobody operates: the session plays while nobody is there, and stops for who comes."""
+"""A show that nobody operates: the session plays until somebody comes, and again afterwards."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Setups in a running show: noted in the session as they change, and brought back by undo."""
+"""Setups in a running show: written to the session when they change, and restored by undo."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A recording in which nobody is seen: it lets a show go on while a session plays."""
+"""A recording in which nobody is seen: with it a show goes on while a session plays."""
 
 from __future__ import annotations
 

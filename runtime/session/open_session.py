@@ -1,4 +1,4 @@
-"""Opening a session for a show: its actors are the characters on the stage, in their order."""
+"""Opens a session for a show: its actors become the characters on the stage."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a take made a character do, frame by frame: its nodes, its place on the stage, its face."""
+"""What a character did in a take, frame by frame: its nodes, its place on the stage, its face."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What plays: an actor at a moment, as a function of the session and the time alone."""
+"""What an actor does at a moment, as a function of the session and the time alone."""
 
 from __future__ import annotations
 

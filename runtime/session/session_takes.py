@@ -1,4 +1,4 @@
-"""Recording into a session: the performers' frames and what they make of the characters."""
+"""Records takes into a session: the performers' frames, and what the characters did."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Setups: what drives an actor of a session, and its surface, as frozen values."""
+"""Setups as immutable values: what drives an actor of a session, and how its surface deforms."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The transport of a session: where its time stands, and what the time does."""
+"""The transport of a session: the present moment, and whether the time runs, stands or loops."""
 
 from __future__ import annotations
 

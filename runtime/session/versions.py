@@ -1,4 +1,4 @@
-"""Undo and redo: the versions of a session, one for each step that a user thinks of as one."""
+"""Undo and redo: the versions of a session, one for each step of the user."""
 
 from __future__ import annotations
 

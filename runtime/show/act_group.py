@@ -1,4 +1,4 @@
-"""Acts: each performer with the puppets that follow; and the matching of all acts as one."""
+"""All acts of a show: each performer with the puppets that follow, matched together."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The frames that came since the last tick: put in order, and given to the performers' slots."""
+"""The frames that arrived since the last tick: sorted, and given to the performers' slots."""
 
 from __future__ import annotations
 

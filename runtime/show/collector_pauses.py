@@ -1,4 +1,4 @@
-"""Keeping pauses of Python's garbage collector out of a show."""
+"""Keeps pauses of Python's garbage collector out of a show."""
 
 from __future__ import annotations
 

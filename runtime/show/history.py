@@ -1,4 +1,4 @@
-"""Jumps within a recording to the same bytes as playing there gives, by snapshots of the show.
+"""Jumps in a recording give the same bytes as playing to that moment, by snapshots of the show.
 
 Conditioning, drivers and solvers remember the frames before, so the picture at a moment depends on
 what was played before it, and a jump by `Playback.seek` differs from playing. A history restores

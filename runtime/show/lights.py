@@ -1,4 +1,4 @@
-"""What lights up on characters and performer in place of the driven chains."""
+"""Colours on characters and performer that show which chains are driven or can be chosen."""
 
 from __future__ import annotations
 

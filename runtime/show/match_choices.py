@@ -1,4 +1,4 @@
-"""What the settings of matching ask for, or else what is usual: drivers, and when they perform."""
+"""From the settings of matching to drivers and countdowns, with the usual values for the rest."""
 
 from __future__ import annotations
 

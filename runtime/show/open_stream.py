@@ -1,4 +1,4 @@
-"""Opening a source of motion: a device by its address, or a recording by its path."""
+"""Opens a source of motion: a device by its address, or a recording by its path."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The pace of a show: when the next tick begins, and what the time until then is used for."""
+"""The pace of a show: when the next tick begins, and what the time before it is used for."""
 
 from __future__ import annotations
 

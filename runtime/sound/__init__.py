@@ -1,1 +1,1 @@
-"""Sound that takes carry: kept as PCM, mixed as a function of the session and the time alone."""
+"""Sound that takes carry: kept as PCM, and mixed for any moment of the session."""

@@ -1,4 +1,4 @@
-"""What is heard of a session: a function of the session and the time alone, like its pictures."""
+"""Mixes the sound of a session: a function of the session and the time alone, like its pictures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A recorded sound, as WAV bytes and from files."""
+"""A recorded sound: read from files, and written as WAV."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The sounds of a session by the names of their files, read when they are first heard."""
+"""The sounds of a session by the names of their files, read at first use."""
 
 from __future__ import annotations
 

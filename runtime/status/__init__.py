@@ -1,1 +1,1 @@
-"""What a show says of itself: what it sees, what drives what, what has just happened."""
+"""What a show tells people: what it sees, what drives what, what has just happened."""

@@ -1,4 +1,4 @@
-"""What a show says while pairs are chosen by hand: how far it is, and what to click next."""
+"""What a show says during mapping by hand: which pairs there are, and what to click next."""
 
 from __future__ import annotations
 

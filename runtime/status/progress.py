@@ -1,4 +1,4 @@
-"""The progress of a long work: a bar on a terminal, a few lines in a log."""
+"""The progress of a long task: a bar on a terminal, a few lines in a log."""
 
 from __future__ import annotations
 

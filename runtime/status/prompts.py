@@ -1,4 +1,4 @@
-"""What a show says to people: what it sees, and what to do next, in plain words."""
+"""What a show says to people, in plain words: what it sees, and what to do next."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a session does and what to do next, in plain words."""
+"""What a session says to people, in plain words: what it does, and what to do next."""
 
 from __future__ import annotations
 

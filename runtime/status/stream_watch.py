@@ -1,4 +1,4 @@
-"""Watches a stream: whether a performer is waited for, seen, lost or not understood."""
+"""Watches a stream: whether a performer is awaited, seen, lost or not understood."""
 
 from __future__ import annotations
 

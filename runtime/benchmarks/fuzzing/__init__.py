@@ -1,1 +1,1 @@
-"""The fuzzer: small valid inputs of each door, damage, and the watch over what it does."""
+"""The fuzzer: valid inputs of each reader and decoder, random damage, and a watch over both."""

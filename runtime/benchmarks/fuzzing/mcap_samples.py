@@ -1,4 +1,4 @@
-"""A recording for the fuzzer in which nothing is compressed: damage reaches what it says."""
+"""A recording for the fuzzer without compression, so that damage reaches its content."""
 
 from __future__ import annotations
 

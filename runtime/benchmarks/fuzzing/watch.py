@@ -1,4 +1,4 @@
-"""Watches what a reader does with an input: it may refuse it in one line, and nothing else."""
+"""Watches what a reader does with a damaged input: it may only read it or refuse it in one line."""
 
 from __future__ import annotations
 

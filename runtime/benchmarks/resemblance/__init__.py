@@ -1,1 +1,1 @@
-"""What is measured of a character beside the performer who drives it."""
+"""Measures of how a character resembles the performer who drives it."""

@@ -1,4 +1,4 @@
-"""A body over time: a performer's joints or a character's posed nodes, and what they are."""
+"""A body over time: a performer's joints or a character's nodes, and the limbs they belong to."""
 
 from __future__ import annotations
 

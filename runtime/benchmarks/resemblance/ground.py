@@ -1,4 +1,4 @@
-"""How a character goes over the ground beside its performer: travel, sliding, hover, squats."""
+"""How a character moves over the ground beside its performer: travel, sliding, hovering, squats."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether the ends of limbs keep their volume: a foot that is crushed shows at once."""
+"""Whether the ends of limbs keep their volume: measures crushed hands and feet."""
 
 from __future__ import annotations
 

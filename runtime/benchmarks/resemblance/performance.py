@@ -1,4 +1,4 @@
-"""One show of a recording and a character, kept frame by frame to be measured."""
+"""Performs a recording with a character and keeps every frame, to be measured."""
 
 from __future__ import annotations
 

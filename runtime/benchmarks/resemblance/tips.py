@@ -1,4 +1,4 @@
-"""What the eye sees of a limb: how far its tip travels on the screen, and when it is up or aside.
+"""What is visible of a limb: how far its tip travels on the screen, and when it is up or aside.
 
 A limb that points right may still hardly show: an arm that is a stub, or one that swings towards
 the audience. So the tips of both bodies are looked at from where the audience sits, each against

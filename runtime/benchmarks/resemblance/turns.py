@@ -1,4 +1,4 @@
-"""Turns that directions of limbs do not show: yaw of the head, roll of hands, curl of fingers."""
+"""Turns that the directions of limbs do not show: head yaw, hand roll, finger curl."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Nodes for driving a bare mesh limb by limb: even on both sides, with hips, chest and a spine.
+"""Nodes for driving a bare mesh limb by limb: alike on both sides, with hips, chest and a spine.
 
 An extracted skeleton is good for matching, but not for posing: its joints are where its separators
 happened to lie, its hips where two thighs can be told apart, and a short trunk is one node that

@@ -1,4 +1,4 @@
-"""Lines along the limbs of a body: alike on both sides, and divided where both bend."""
+"""Lines along the limbs of a body: alike on both sides, and divided at the same places."""
 
 from __future__ import annotations
 

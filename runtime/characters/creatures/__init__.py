@@ -1,1 +1,1 @@
-"""Bodies that people do not have, such as those of many legs, by their shape."""
+"""Plans of bodies unlike a person's, by their shape: many legs, no legs, wings, a hand."""

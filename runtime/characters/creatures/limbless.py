@@ -1,4 +1,4 @@
-"""The plan of a body without limbs: a snake or a worm that lies, a fish, a bottle that stands."""
+"""The plan of a body without limbs: a snake or worm that lies, a fish, a bottle that stands."""
 
 from __future__ import annotations
 

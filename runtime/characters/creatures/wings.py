@@ -1,4 +1,4 @@
-"""Tells the wings of a body without names from its arms: they are long and flat."""
+"""Tells wings from arms in a body without names: wings are long and flat."""
 
 from __future__ import annotations
 

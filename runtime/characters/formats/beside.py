@@ -1,4 +1,4 @@
-"""Find the file that a mesh file names: in its own folder or below, however the name is spelled."""
+"""Finds a file that a mesh file names: in the same folder or below, in any spelling."""
 
 from __future__ import annotations
 

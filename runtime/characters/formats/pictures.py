@@ -1,4 +1,4 @@
-"""The door for pictures of strangers: PNG, JPEG and WebP only, bounded before they are decoded."""
+"""Reads untrusted pictures: only PNG, JPEG and WebP, and bounded before they are decoded."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The options that say of a recording what its file leaves open."""
+"""The options for what a recording's file does not say: rate, up axis, unit, mirroring."""
 
 from __future__ import annotations
 

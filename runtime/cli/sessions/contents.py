@@ -1,4 +1,4 @@
-"""What is in a session, line by line."""
+"""Describes a session line by line: actors, takes, clips and marks."""
 
 from __future__ import annotations
 

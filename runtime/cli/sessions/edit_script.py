@@ -1,4 +1,4 @@
-"""One edit of a script: its fields checked, then done to a session."""
+"""Checks the fields of one edit of a script, and does it to a session."""
 
 from __future__ import annotations
 

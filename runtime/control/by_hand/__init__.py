@@ -1,1 +1,1 @@
-"""Choosing by hand: what lies under the mouse, what lights up, and what each click does."""
+"""Mapping by hand with the mouse: what is under it, what lights up, and what each click does."""

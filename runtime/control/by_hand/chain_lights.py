@@ -1,4 +1,4 @@
-"""What lights up while pairs are chosen by hand: what can be clicked, and what is pointed at."""
+"""What lights up during mapping by hand: what can be clicked, and what the mouse points at."""
 
 from __future__ import annotations
 

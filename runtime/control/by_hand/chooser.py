@@ -1,4 +1,4 @@
-"""Choosing by hand what drives what: clicks on the performer's small picture and on characters.
+"""Mapping by hand: clicks on the performer's small picture and on characters become pairs.
 
 AniMesh (Jin et al. 2015), section 3 and figure 2: the user overrides the matching by selecting
 chains of the source and of the target.

@@ -1,4 +1,4 @@
-"""The actions on choosing by hand: begin, take together, spread out, turn, and take away."""
+"""The actions of mapping by hand: begin, take all alike, set delays, turn the view, clear."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What lies under a place of the picture: a part of the performer, or one of a character."""
+"""What lies under a point of the picture: a part of the performer, or of a character."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Driving a body limb by limb: what corresponds, how it is posed, and how it stands."""
+"""Driving a body limb by limb: which limbs correspond, how they are posed, how the body stands."""

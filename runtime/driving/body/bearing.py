@@ -1,4 +1,4 @@
-"""How the trunk of a character bears itself where the performer's stands upright.
+"""How the trunk of a character is tilted, at rest and as its performer bows.
 
 A body that stands as people do turns as the performer's trunk turns. One that lies close to the
 floor has no room for that: a spider that bowed as deep as its performer would stand on its jaws.

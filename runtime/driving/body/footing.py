@@ -1,4 +1,4 @@
-"""Keeps a body that is driven limb by limb on its feet: planted, flat, and on the floor."""
+"""Keeps the feet of a body that is driven limb by limb planted, flat, and on the floor."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Two hands without a body as its arms: they begin at its shoulders, as wide apart as its own."""
+"""Drives the arms of a body by two hands without a body: puts shoulders to them."""
 
 from __future__ import annotations
 

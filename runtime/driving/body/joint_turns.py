@@ -1,4 +1,4 @@
-"""How single joints of the performer are turned, where the stream gives rotations."""
+"""How the performer's joints are turned, if the stream gives rotations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Keeps arms and wings that would reach below the floor lying on it.
+"""Lays arms and wings that would reach below the floor on the floor.
 
 A bird that let its wings hang as a performer lets the arms hang would stand on them as on stilts,
 and a robot with long arms could not squat. Arms give way to their own side, and forelegs, which

@@ -1,4 +1,4 @@
-"""Lets a body of many legs step as its performer steps: the feet go where the performer's go.
+"""Steps a body of many legs as its performer steps: its feet go where the performer's feet go.
 
 A leg that arches up from the body and down to the floor cannot point where a performer's leg
 points. So its foot is moved as far as the performer's ankle has moved from standing, and its knee

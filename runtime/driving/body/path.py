@@ -1,4 +1,4 @@
-"""The path of a character on the stage: how it is turned, and how far its hips have travelled."""
+"""The path of a character on the stage: its heading, and how far its hips have travelled."""
 
 from __future__ import annotations
 

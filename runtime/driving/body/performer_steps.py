@@ -1,4 +1,4 @@
-"""How a performer's feet and hands have moved from standing upright, for feet that follow them."""
+"""How a performer's feet and hands have moved since standing upright, for feet that follow them."""
 
 from __future__ import annotations
 

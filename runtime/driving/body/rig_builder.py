@@ -1,4 +1,4 @@
-"""Builds the rig of a character's body: which segment of a limb follows which joints."""
+"""Builds the rig of a character's body: which limb segment follows which of the performer's."""
 
 from __future__ import annotations
 

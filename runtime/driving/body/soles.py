@@ -1,4 +1,4 @@
-"""The lowest points of the feet of a character, as its skin carries them.
+"""The lowest points of a character's feet, moved with its skin.
 
 A foot hardly turns against its shin while it stands, so its points follow the linear blend of the
 motions of their nodes, which costs a tenth of what the character's own surface costs.

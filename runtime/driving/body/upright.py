@@ -1,4 +1,4 @@
-"""What a performer's trunk and head look like while standing upright: the zero of their turns."""
+"""A performer's trunk and head while standing upright: the zero from which turns are measured."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Lets the wings of a character follow the arms of a performer as wings do.
+"""Bends the wings of a character when the performer's arms move.
 
 Bone for bone, a bent elbow would fold a wing in the middle like a board. A wing has no elbow to be
 seen: its bend is spread over its whole length, and is limited. Neither does a wing reach as far to

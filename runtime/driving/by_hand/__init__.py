@@ -1,1 +1,1 @@
-"""Mapping by hand: the chains that can be chosen, and the pairs that are made of them."""
+"""Mapping by hand: the chains that can be chosen, and the pairs made of them."""

@@ -1,4 +1,4 @@
-"""The pairs that a person chooses, click by click; a value that every click turns into another."""
+"""The pairs that a person chooses click by click, as immutable values."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Matching one puppet to a performer: which mapping is chosen, and what drives meanwhile."""
+"""Matching one puppet to a performer: which mapping is chosen, and what drives until then."""

@@ -1,4 +1,4 @@
-"""Which chains a hand drives: of a hand its fingers, of a body what a glove puppet's hand moves."""
+"""Which chains a performer's hand drives: a hand's fingers, or a body as a glove puppet."""
 
 from __future__ import annotations
 

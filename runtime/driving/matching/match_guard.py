@@ -1,4 +1,4 @@
-"""What a match of a body's limbs must not be, and which of the matches looks like its anatomy.
+"""Rejects matches that contradict a body's anatomy, and prefers those that look like it.
 
 The screen alone takes any part that points the same way for an arm. A body's left and right arm
 are a pair, so they belong to a pair of limbs, left to left; its head belongs to the middle, its

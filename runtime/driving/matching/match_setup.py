@@ -1,4 +1,4 @@
-"""The setup of a match: all that makes a puppet move with a performer as it does."""
+"""The setup of a match: everything that is needed to drive a puppet in the same way again."""
 
 from __future__ import annotations
 

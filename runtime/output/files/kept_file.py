@@ -1,4 +1,4 @@
-"""Files of a show that may fail while the show goes on, and what was kept of each."""
+"""Files of a show that may fail while the show goes on, and what was written to each."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The sound of a video: a WAV file that is encoded beside the pictures, as far as they are."""
+"""The sound of a video: a WAV file that is encoded along with the pictures."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Sessions on the disk: the folder that is written while one is edited, and the file made of it."""
+"""Sessions on the disk: the folder of an open session, and the file that is made of it."""

@@ -1,4 +1,4 @@
-"""The file of a session: a zip of open formats, from which a damaged one is read as far as it goes.
+"""The file of a session: a zip of open formats, which is read as far as it is intact.
 
 The JSON stands first in the zip, so that it is there even where the file was cut short, and the
 list of contents at its end was lost.

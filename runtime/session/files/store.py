@@ -1,4 +1,4 @@
-"""Where a session is kept: one file, and beside it a folder while the session is open."""
+"""Where a session is kept: in one file, and in a folder beside it while the session is open."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A take that was running when its program died: its recording is kept, and told how to use."""
+"""Keeps the recording of a take that was running when its program was killed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""All that a show opens: devices, solvers, window and files, in an order that fails early."""
+"""Opens devices, solvers, window and files of a show, in an order that fails early."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a show writes: its outputs, its takes, the recording of the whole, and its report."""
+"""Opens what a show writes: its outputs, its takes, its recording, and its report."""
 
 from __future__ import annotations
 
