@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from runtime.conditioning.switches import STEPS, SWITCHES
 from runtime.control.action import Action, Kind, switch
 from runtime.control.by_hand.choosing_actions import CHOOSING_ACTIONS
+from runtime.control.match_actions import MATCH_ACTIONS
 from runtime.control.session_actions import SESSION_ACTIONS
 from runtime.control.show_controls import ShowControls
 from runtime.control.sliders import SLIDERS, STEP, Slider
@@ -291,6 +292,7 @@ ACTIONS: Mapping[str, Action] = {
         for name, action in _slider_actions(slider_name, slider).items()
     },
     **{name: _conditioning(name, *STEPS[name]) for name in SWITCHES},
+    **MATCH_ACTIONS,
     **CHOOSING_ACTIONS,
     **SESSION_ACTIONS,
     "leave": Action("Leave", "end the show", press=leave, words=lambda _: "leaving"),

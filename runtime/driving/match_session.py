@@ -278,6 +278,12 @@ class MatchSession:
         """Show the match before the one shown, and stay there; also in the midst of performing."""
         self._step(-1)
 
+    def show_match(self, rank: int) -> None:
+        """Show one of the best matches, 1 for the first, and stay there; as `next_match`."""
+        self._kept = None
+        for match in self._chosen:
+            match.take(rank, self._view())
+
     @property
     def _chosen(self) -> list[PuppetMatch]:
         """The puppets that actions are for."""

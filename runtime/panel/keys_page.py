@@ -9,6 +9,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from runtime.control.actions import ACTIONS
 from runtime.control.keys import KEYS
+from runtime.control.match_actions import MATCH_ACTIONS
 from runtime.control.session_actions import SESSION_ACTIONS
 from runtime.control.show_controls import ShowControls
 from runtime.panel.gui import GOLD, PAPER
@@ -20,6 +21,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "accept",
         "next-match",
         "previous-match",
+        "match-1",
         "keep-match",
         "rest-pose",
         "calibrate",
@@ -79,6 +81,8 @@ GROUPS: dict[str, tuple[str, ...]] = {
 }
 """The groups of actions, those most used first."""
 
+TOGETHER = {"match-1": ("1 to 4", "Best matches", "light up the best match, or one after it")}
+"""Rows that stand for several keys."""
 SPELLED = {".": ". dot", ",": ", comma"}
 MOUSE = (
     ("left button", "Turn", "go round the stage"),
@@ -146,12 +150,13 @@ def _groups(*, in_session: bool) -> list[Group]:
     idle = set() if in_session else set(SESSION_ACTIONS) - {"loop"}
     key_of = {name: key for key, name in KEYS.items() if name not in idle}
     grouped = [name for names in GROUPS.values() for name in names]
-    rest = [name for name in key_of if name not in grouped]
+    rest = [name for name in key_of if name not in (*grouped, *MATCH_ACTIONS)]
     named = {**GROUPS, "More": tuple(rest)}
     groups: list[Group] = []
     for group, names in named.items():
         rows = [
-            (SPELLED.get(key_of[name], key_of[name]), ACTIONS[name].label, ACTIONS[name].text)
+            TOGETHER.get(name)
+            or (SPELLED.get(key_of[name], key_of[name]), ACTIONS[name].label, ACTIONS[name].text)
             for name in names
             if name in key_of
         ]

@@ -17,6 +17,7 @@ from runtime.panel.gui import Gui
 from runtime.panel.keys_page import draw_keys
 from runtime.panel.legend import WIDTH as LEGEND
 from runtime.panel.legend import draw_legend
+from runtime.panel.match_pictures import MatchPictures
 from runtime.panel.sliders import WIDTH as SLIDERS
 from runtime.panel.sliders import draw_sliders
 from runtime.panel.status_card import LEAST as STATUS_LEAST
@@ -58,6 +59,7 @@ class Panel:
         self._clock = clock
         self._drawn = clock()
         self._timeline = Timeline()
+        self._matches = MatchPictures()
         self._shown: ShowStatus | None = None
         self._read = -math.inf
         self._taken = (0.0, 0.0, 0.0, 0.0)
@@ -103,9 +105,13 @@ class Panel:
             above += self._timeline.draw(controls, margin, above - margin, scale)
         if controls.chooser.on:
             above += draw_choosing(controls, margin, above - margin, scale)
-        draw_legend(status, controls, margin, scale, inset, above)
+        matches = self._matches.draw(status, controls, margin, above, scale)
+        between = self._matches.left > margin + LEGEND * scale  # the columns at the sides
+        beneath, above = above, above + matches
+        draw_legend(status, controls, margin, scale, inset, beneath if between else above)
         if sliders:
-            draw_sliders(controls, margin, scale, margin if beside else below + margin, above)
+            top = margin if beside else below + margin
+            draw_sliders(controls, margin, scale, top, beneath if between else above)
         self._taken = (
             max(inset, margin + LEGEND * scale) / screen.x,
             column / screen.x if sliders else 0.0,

@@ -128,6 +128,10 @@ class ActGroup:
         """The match of each character, whichever is selected."""
         return [match for act in self._acts for match in act.match_session.matches]
 
+    def performer_of(self, number: int) -> Performer:
+        """Return who drives a character, by its number."""
+        return [act.performer for act in self._acts for _ in act.puppets][number]
+
     def choose(self, number: int, mapping: Mapping | None) -> None:
         """Let a character, by its number, follow a mapping made by hand; None to match it again.
 
@@ -184,6 +188,11 @@ class ActGroup:
         """See `MatchSession.previous_match`."""
         for match_session in self._sessions:
             match_session.previous_match()
+
+    def show_match(self, rank: int) -> None:
+        """See `MatchSession.show_match`."""
+        for match_session in self._sessions:
+            match_session.show_match(rank)
 
     @property
     def _sessions(self) -> list[MatchSession]:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 from solvers.matching import Match
 
+BEST = 4  # matches that are offered side by side
+
 
 @dataclass(frozen=True, slots=True)
 class MatchHysteresisState:
@@ -17,12 +19,14 @@ class MatchHysteresisState:
         ranked: the last frame's matches, best first.
         since: [s] the time since which another match differs by the margin, None without one.
         pinned: whether the match was chosen by hand.
+        best: see `MatchHysteresis.best`.
     """
 
     shown: Match | None
     ranked: tuple[Match, ...]
     since: float | None
     pinned: bool
+    best: tuple[Match, ...] = ()
 
 
 class MatchHysteresis:
@@ -41,6 +45,7 @@ class MatchHysteresis:
         self.pinned = False
         self._shown: Match | None = None
         self._ranked: tuple[Match, ...] = ()
+        self._best: tuple[Match, ...] = ()
         self._since: float | None = None
 
     @property
@@ -54,14 +59,22 @@ class MatchHysteresis:
         position = self._position(self._shown)
         return (0 if position is None else position + 1), len(self._ranked)
 
+    @property
+    def best(self) -> tuple[Match, ...]:
+        """Up to four of the best matches of the last frames, in an order that noise leaves alone.
+
+        They change when, at any of their places, another match is better by the margin.
+        """
+        return self._best
+
     def snapshot(self) -> MatchHysteresisState:
         """Return the memory that the next update depends on."""
-        return MatchHysteresisState(self._shown, self._ranked, self._since, self.pinned)
+        return MatchHysteresisState(self._shown, self._ranked, self._since, self.pinned, self._best)
 
     def restore(self, state: MatchHysteresisState) -> None:
         """Go back to a snapshot; rank, margin and hold stay as they are."""
         self._shown, self._ranked = state.shown, state.ranked
-        self._since, self.pinned = state.since, state.pinned
+        self._since, self.pinned, self._best = state.since, state.pinned, state.best
 
     def update(self, ranked: Sequence[Match], time: float) -> Match | None:
         """Take a frame's matches, best first, at `time` [s]; return the match to show.
@@ -71,6 +84,7 @@ class MatchHysteresis:
         a recording loops, the waiting time starts again.
         """
         self._ranked = tuple(ranked)
+        self._keep_best()
         if not self._ranked:
             self._since = None
             return self._shown
@@ -102,10 +116,26 @@ class MatchHysteresis:
             self.pinned = True
         return self._shown
 
+    def choose(self, rank: int) -> None:
+        """Show and pin one of the best matches, 0 for the first of them, if there are so many."""
+        if 0 <= rank < len(self._best):
+            self._show(self._best[rank])
+            self.pinned = True
+
     def release(self) -> None:
         """Undo the pin: the pose chooses the match again."""
         self.pinned = False
         self._since = None
+
+    def _keep_best(self) -> None:
+        """Give the best matches their new scores, or take others that are better by the margin."""
+        wanted = self._ranked[:BEST]
+        places = [self._position(each) for each in self._best]
+        kept = tuple(self._ranked[place] for place in places if place is not None)
+        steady = len(kept) == len(wanted) and all(
+            new.merit - old.merit <= self.margin for new, old in zip(wanted, kept, strict=True)
+        )
+        self._best = kept if steady else wanted
 
     def _show(self, match: Match) -> None:
         self._shown = match

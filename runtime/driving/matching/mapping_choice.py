@@ -86,7 +86,7 @@ class MappingChoice:
                 f"{self._puppet.character.name} has {len(ranked)} matches with this part "
                 f"of the performer, so there is no --match {self._choices.rank}"
             )
-        return self._mapping_of(match)
+        return self.mapping_of(match)
 
     def best_of(
         self,
@@ -116,8 +116,8 @@ class MappingChoice:
         worths = [self._worth(mapping, state, view, seen) for mapping, state, _ in choices]
         return choices[int(np.argmax(worths))]
 
-    def _mapping_of(self, match: Match) -> Mapping:
-        """The mapping of a match: its chains without the parts inside the trunk."""
+    def mapping_of(self, match: Match) -> Mapping:
+        """Return the mapping of a match: its chains without the parts inside the trunk."""
         chosen = match if self._choices.extend else match.stopped()
         joints, skeleton = self._performer.joints, self._puppet.bound_skeleton
         drives = []

@@ -71,16 +71,14 @@ class PuppetMatch:
     ) -> None:
         self.puppet = puppet
         self.rest: Rest | None = None
-        self._performer = performer
-        self._choices = choices
+        self._performer, self._choices = performer, choices
         self._given = self._own = self._drives = OwnChoice(by_hand=by_hand)
         self._clip: Sequence[Pose] = ()
         self._mapping_choice = MappingChoice(performer, source, puppet, choices, by_hand)
         self._hysteresis = MatchHysteresis(choices.rank - 1)
         self._make_usual = make_driver
         self._of_hands = mapping_of_hands(self._pairing()) if make_driver is best_driver else None
-        self.matching = True
-        self._view = STRAIGHT_ON
+        self.matching, self._view = True, STRAIGHT_ON
         self._driver = self._make(make_driver)
         guarded = make_driver is best_driver and isinstance(self._driver, MappedDriver)
         self._anatomy = MatchGuard(performer, source, puppet) if guarded else None
@@ -125,6 +123,13 @@ class PuppetMatch:
         return Candidate(rank, count, self.mapping.score)
 
     @property
+    def best(self) -> list[Mapping]:
+        """Up to four of the best matches that can be stepped through, while one is shown."""
+        if not self.matching or self.candidate is None or self._own.by_hand is not None:
+            return []
+        return [self._mapping_choice.mapping_of(each) for each in self._hysteresis.best]
+
+    @property
     def patience(self) -> float:
         """[s] that the performer must keep still before what is shown performs by itself."""
         first, again = self._choices.patience, self._choices.again
@@ -165,8 +170,7 @@ class PuppetMatch:
         shown = self._shown
         if not isinstance(shown, MappedDriver):
             return False
-        before = shown.mapping.drives
-        mapping = self._of_anatomy
+        before, mapping = shown.mapping.drives, self._of_anatomy
         if mapping is None:
             mapping = self._mapping_choice.of_pose(
                 self._hysteresis, positions, time, view, self._guard
@@ -306,6 +310,11 @@ class PuppetMatch:
         if not self.matching:
             self._look_again(view)
 
+    def take(self, rank: int, view: Array) -> None:
+        """Show one of the `best` matches, 1 for the first, and stay there, as `step` does."""
+        self.step(0, view)
+        self._hysteresis.choose(rank - 1)
+
     def keep(self) -> None:
         """Stop looking for a match; the puppet goes on as it performs."""
         if self.rest is not None:
@@ -382,14 +391,9 @@ class PuppetMatch:
 
     def _pairing(self) -> Pairing:
         puppet, performer = self.puppet, self._performer
-        return Pairing(
-            performer.skeleton,
-            tuple(performer.joints),
-            puppet.character,
-            puppet.bound_skeleton,
-            puppet.surface,
-            self._own.by_hand,
-        )
+        joints, own = tuple(performer.joints), self._own
+        moved = puppet.character, puppet.bound_skeleton, puppet.surface
+        return Pairing(performer.skeleton, joints, *moved, own.by_hand)
 
     def _make(self, make_driver: DriverFactory) -> Driver:
         return driver_of_joints(make_driver, self._pairing())

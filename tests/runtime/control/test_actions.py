@@ -17,6 +17,7 @@ from runtime.conditioning.switches import SWITCHES
 from runtime.control import actions
 from runtime.control.actions import ACTIONS
 from runtime.control.by_hand.choosing_actions import CHOOSING_ACTIONS
+from runtime.control.match_actions import MATCH_ACTIONS
 from runtime.control.session_actions import SESSION_ACTIONS
 from runtime.control.sliders import SLIDERS
 from runtime.puppet.deformable_surface import Elasticity
@@ -68,6 +69,7 @@ TRIED_HERE = {
     "play", "pause", "home", "record", "freeze", "in-place", "blackout", "frame-all", "chains",
     "select", "keep-match", "front", "panel", "sliders", "help", "full-screen", "audience",
     "count-in", "next-count-in", "leave", *FADERS, *SESSION_ACTIONS, *CHOOSING_ACTIONS,
+    *MATCH_ACTIONS,
     *(f"{name}-{way}" for name in FADERS for way in ("up", "down")), *SWITCHES,
 }  # fmt: skip
 

@@ -186,6 +186,24 @@ def test_matches_are_stepped_through_and_stay(puppet: Puppet) -> None:
     assert show.strike(pose(T_POSE)) not in (best, second)
 
 
+def test_one_of_the_best_matches_is_taken_and_stays(puppet: Puppet) -> None:
+    show = Rehearsal(puppet, Choices(patience=math.inf))
+    best = show.strike(pose(T_POSE))
+    (match,) = show.match_session.matches
+    offered = [mapping.drives for mapping in match.best]
+    assert len(offered) == 4
+    assert offered[0] == best
+    show.match_session.show_match(3)
+    for _ in range(12):
+        assert show.strike(pose(T_POSE)) == offered[2]
+    assert [mapping.drives for mapping in match.best] == offered
+    show.match_session.accept()
+    assert match.best == []
+    show.match_session.show_match(2)
+    assert show.match_session.matching, "asked for in the midst of a performance"
+    assert show.strike(pose(T_POSE)) == offered[1]
+
+
 def test_matching_again_looks_at_the_pose_alone(puppet: Puppet) -> None:
     show = Rehearsal(puppet, Choices(patience=math.inf))
     best = show.strike(pose(T_POSE))

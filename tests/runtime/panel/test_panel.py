@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import moderngl
 import numpy as np
@@ -12,7 +11,6 @@ import pytest
 from imgui_bundle import imgui
 from numpy.typing import NDArray
 
-from replay.player import EveryFrame, Player
 from runtime.control.actions import ACTIONS
 from runtime.control.keys import KEYS
 from runtime.control.session_actions import SESSION_ACTIONS
@@ -20,70 +18,16 @@ from runtime.control.show_controls import ShowControls
 from runtime.driving.choices import Candidate
 from runtime.driving.driver import RELATIVE, DrivenPart
 from runtime.panel import keys_page
-from runtime.panel.panel import Panel
 from runtime.show.scene import NOTHING_TAKEN
 from runtime.status.show_status import ShowStatus
+from tests.runtime.panel.screen import SIZE, Screen, covered
 from tests.runtime.staged import StagedShow
-from tests.runtime.stick_figures import make_figure, record, waving
 
-SIZE = (1280, 720)
 SMALL = (800, 600)
+BESIDE = {1280: 990, 800: 740}  # [px] a column in which there is nothing above the bar
 SIZES = (SMALL, SIZE, (1920, 1080), (3840, 2160))
 DOUBLE = 27  # a pixel over which two cards lie is darker than this, one under a single card is not
 LETTER_HEIGHT = 9  # [px] the lowest that can be read
-
-
-class Screen:
-    """A panel over a grey picture, and a mouse."""
-
-    def __init__(
-        self, context: moderngl.Context, show: StagedShow, size: tuple[int, int] = SIZE
-    ) -> None:
-        self.now = 0.0
-        self.target = context.simple_framebuffer(size, components=4)
-        self.status = show._opened.status
-        self.panel = Panel(context, show.controls, self._newest, clock=lambda: self.now)
-
-    def _newest(self) -> ShowStatus:
-        return self.status()
-
-    def draw(self, frames: int = 2) -> NDArray[np.uint8]:
-        """Draw so many pictures a fifth of a second apart; the last, upper row first."""
-        for _ in range(frames):
-            self.now += 0.2
-            self.target.clear(0.5, 0.5, 0.5, 1.0)
-            self.panel.draw(self.target)
-        width, height = self.target.size
-        read = np.frombuffer(self.target.read(components=3, alignment=1), np.uint8)
-        return read.reshape(height, width, 3)[::-1]
-
-    def click(self, x: float, y: float) -> bool:
-        """Click with the left button; whether the panel kept the click for itself."""
-        gui = self.panel.gui
-        gui.cursor(x, y)
-        self.draw(1)
-        kept = gui.button(0, down=True)
-        self.draw(1)
-        gui.button(0, down=False)
-        self.draw(1)
-        return kept
-
-
-@pytest.fixture
-def show(context: moderngl.Context, tmp_path: Path) -> Iterator[StagedShow]:
-    stream = Player(record(waving(60)), EveryFrame())
-    show = StagedShow(context, make_figure(), stream, tmp_path)
-    show.loop.tick()
-    yield show
-    show.close()
-
-
-@pytest.fixture
-def screen(context: moderngl.Context, show: StagedShow) -> Iterator[Screen]:
-    screen = Screen(context, show)
-    yield screen
-    screen.panel.close()
-    screen.target.release()
 
 
 @pytest.fixture
@@ -108,12 +52,8 @@ def words(monkeypatch: pytest.MonkeyPatch) -> set[str]:
     return seen
 
 
-def covered(picture: NDArray[np.uint8]) -> NDArray[np.bool_]:
-    """The pixels that the panel covers or tints."""
-    return np.abs(picture.astype(int) - 128).max(axis=2) > 2
-
-
-def test_the_panel_leaves_the_middle_of_the_stage_free(screen: Screen) -> None:
+def test_the_panel_leaves_the_middle_of_the_stage_free(screen: Screen, show: StagedShow) -> None:
+    show.match_session.accept()
     over = covered(screen.draw())
     assert 0.05 < over.mean() < 0.45
     assert not over[250:560, 400:1250].any()
@@ -142,7 +82,8 @@ def test_the_legend_of_many_characters_leaves_the_bar_free(
 
 def _top_of_bar(picture: NDArray[np.uint8]) -> int:
     """The first row [px] of the bar, where nothing else is."""
-    return 300 + int(np.flatnonzero(covered(picture)[300:, 640]).min())
+    beside = BESIDE[picture.shape[1]]
+    return 300 + int(np.flatnonzero(covered(picture)[300:, beside]).min())
 
 
 def _rows_of_bar(picture: NDArray[np.uint8]) -> list[float]:
@@ -239,7 +180,7 @@ def test_a_button_says_at_once_what_it_does(screen: Screen) -> None:
 @pytest.mark.parametrize("in_session", [True, False])
 def test_the_page_of_keys_has_every_key_once(in_session: bool) -> None:
     groups = keys_page._groups(in_session=in_session)
-    shown = [key for _, rows in groups for key, _, _ in rows]
+    shown = [key for _, rows in groups for key, _, _ in rows if key != "1 to 4"] + list("1234")
     mouse = [key for key, _, _ in keys_page.MOUSE]
     idle = set() if in_session else set(SESSION_ACTIONS) - {"loop"}
     keys = [keys_page.SPELLED.get(key, key) for key, name in KEYS.items() if name not in idle]

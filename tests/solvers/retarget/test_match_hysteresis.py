@@ -134,3 +134,34 @@ def test_going_on_from_a_snapshot_shows_the_same_matches():
     h.restore(state)
     h.cycle(1)
     assert shown(h) == "b"  # the matches of the snapshot's frame are known again
+
+
+def names(matches):
+    return "".join({1: "a", 2: "b", 3: "c"}[match.pairs[0][1][-1]] for match in matches)
+
+
+def test_the_best_keep_their_places_in_noise_and_leave_them_for_what_is_clearly_better():
+    h = MatchHysteresis(margin=0.2)
+    h.update(ranked(a=1.0, b=0.95, c=0.9), 0.0)
+    assert names(h.best) == "abc"
+    h.update(ranked(a=0.9, b=1.0, c=0.95), 0.1)
+    assert names(h.best) == "abc"
+    assert [match.merit for match in h.best] == [0.9, 1.0, 0.95]
+    h.update(ranked(a=0.7, b=1.0, c=0.95), 0.2)
+    assert names(h.best) == "bca"
+    h.update(ranked(b=1.0, c=0.95), 0.3)
+    assert names(h.best) == "bc"
+
+
+def test_one_of_the_best_can_be_chosen_and_stays():
+    h = MatchHysteresis(hold=0.0)
+    h.update(ranked(a=1.0, b=0.9, c=0.2), 0.0)
+    kept = h.snapshot()
+    h.choose(1)
+    h.update(ranked(a=2.0, b=0.9, c=0.2), 1.0)
+    assert shown(h) == "b"
+    h.choose(7)
+    assert shown(h) == "b"
+    h.restore(kept)
+    h.choose(2)
+    assert shown(h) == "c"
