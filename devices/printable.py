@@ -6,7 +6,7 @@ MOST_LETTERS = 1000
 
 
 def printable(text: str, most: int = MOST_LETTERS) -> str:
-    """The text in one line of at most `most` letters that no terminal takes for a command.
+    """The text in one line of at most `most` letters, without control characters.
 
     Blanks and line ends become one blank; control characters, and signs that reverse the direction
     of writing, become question marks.

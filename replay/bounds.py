@@ -39,7 +39,7 @@ def check_recordable(path: Path) -> None:
 
 
 def check_poses(frames: int, joints: int) -> None:
-    """Refuse more frames of so many joints than are read.
+    """Refuse a recording with more frames, for this number of joints, than are read.
 
     Raises:
         InputError: there are too many.
@@ -53,7 +53,7 @@ def check_poses(frames: int, joints: int) -> None:
 
 @np.errstate(all="ignore")  # numbers of a damaged file
 def plausible(recording: Recording) -> Recording:
-    """The recording without places that nothing can be at; a note says how many there were.
+    """The recording without impossible places; a note says how many there were.
 
     Raises:
         InputError: its times are beyond `MOST_SECONDS` or not in order, or its skeleton is one that

@@ -51,7 +51,7 @@ _INSIDE = ((b"<COLLADA", ".dae"),)
 
 
 def conversion_hint(path: Path, head: bytes = b"") -> str | None:
-    """What a file is, and what makes one of it that is read; None if its format is not known.
+    """The format of a file and the program that converts it; None if the format is not known.
 
     Args:
         path: of the file; its suffix, in any case, counts where its content says nothing.

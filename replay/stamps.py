@@ -12,7 +12,7 @@ _LONGEST = 3.0  # [s] that a frame lasts; a greater step has a smaller unit
 
 
 def units_per_second(stamps: Array, rate: float | None, notes: list[str]) -> float:
-    """Return how many of their unit are a second; it is noted if that is not the second itself.
+    """Return how many units of the stamps are a second; a note says so if it is not 1.
 
     Args:
         stamps: (T,) of the frames, finite, of any unit.

@@ -64,7 +64,7 @@ class Stated:
         return None if self.unit is None else METRES[self.unit]
 
     def applied(self, recording: Recording) -> Recording:
-        """The recording at the stated rate and the right way round; axis and unit are a reader's.
+        """The recording at the stated rate, unmirrored; readers have applied axis and unit.
 
         Frames of the same time stay together.
         """

@@ -50,7 +50,7 @@ _NO_NETWORK = ("NewConnectionError", "NameResolution", "ConnectTimeout", "ProxyE
 
 @dataclass(frozen=True, slots=True)
 class Models:
-    """Files of models that MediaPipe's tasks read."""
+    """The models that MediaPipe's tasks read."""
 
     pose: Path
     hand: Path

@@ -86,7 +86,7 @@ def _watch(show: BinaryIO, begun: threading.Event) -> None:
 
 
 def make_way() -> None:
-    """Leave one processor core, and the others when it wants them, to the show."""
+    """Leave one processor core to the show, and the others when the show needs them."""
     if hasattr(os, "nice"):
         with suppress(OSError):
             os.nice(POLITENESS)

@@ -206,7 +206,7 @@ def read_mcap(path: Path) -> Recording:
 
 
 def most_frames(joints: int, size: int) -> int:
-    """How many frames are believed of a file: what its size makes likely and memory allows.
+    """The most frames that are read from a file, by its size and the memory.
 
     Compressed chunks can hold thousands of times their size.
 

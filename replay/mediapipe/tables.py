@@ -61,7 +61,7 @@ def has_landmark_table(head: str) -> bool:
 
 
 def delimiter(line: str) -> str:
-    """What parts the fields of a table's first line."""
+    """The delimiter of the fields in a table's first line."""
     return max(",;\t|", key=line.count)
 
 

@@ -63,7 +63,7 @@ class Soak:
 
     @property
     def warm(self) -> int:
-        """The second of the show from which on memory counts."""
+        """The second of the show from which memory is measured."""
         return int(min(WARM_UP * len(self.memory), MOST_WARM_UP))
 
     @property
@@ -74,7 +74,7 @@ class Soak:
 
     @property
     def stalled(self) -> NDArray[np.bool_]:
-        """The slow ticks (T,) with stolen time in them or in the next: it is counted late."""
+        """The slow ticks (T,) with stolen time in them or in the next, as it is reported late."""
         counted_later = np.append(self.stolen[1:], 0.0)
         stalled: NDArray[np.bool_] = self.slow & (self.stolen + counted_later >= 0.99 * JIFFY)
         return stalled

@@ -36,7 +36,7 @@ def run(options: argparse.Namespace) -> int:
 
 
 def is_camera(url: str) -> bool:
-    """Whether performers stand before a webcam, and so look at a show as into a mirror."""
+    """Whether an address is a webcam's, whose performers see the show as in a mirror."""
     return url.startswith(CAMERA) and not url.startswith(FILM)
 
 

@@ -23,7 +23,7 @@ class SilenceState:
 
 
 class Silence:
-    """Makes frames of nobody for the slots whose performers send no more.
+    """Makes frames without joints for the slots whose performers have stopped sending.
 
     Args:
         slots: how many performers drive.

@@ -57,7 +57,7 @@ class TimelineState:
 
 
 class Timeline:
-    """Admits the frames of a stream in order, on a clock of its own that never falls.
+    """Admits the frames of a stream in order, on a clock of its own that never runs back.
 
     Attributes:
         late: frames dropped so far because a newer one had come.

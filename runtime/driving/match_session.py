@@ -188,7 +188,7 @@ class MatchSession:
         return [match.try_out(tried, placed) for match in self._matches]
 
     def direct(self, frame: SkeletonFrame) -> None:
-        """While matching, show the best match of the newest pose; accept it in time."""
+        """While matching, show the best match of the newest pose; accept it after the countdown."""
         self._now = frame.time
         pose = self._performer.pose
         if pose is not None:
@@ -271,11 +271,11 @@ class MatchSession:
             self._matches[number].choose(mapping, self._view())
 
     def next_match(self) -> None:
-        """Show the match after the one shown, and stay there; also in the midst of performing."""
+        """Show the next match, and stay there; also while performing."""
         self._step(1)
 
     def previous_match(self) -> None:
-        """Show the match before the one shown, and stay there; also in the midst of performing."""
+        """Show the previous match, and stay there; also while performing."""
         self._step(-1)
 
     def show_match(self, rank: int) -> None:

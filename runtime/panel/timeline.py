@@ -32,8 +32,8 @@ TICK = 70.0  # [px] between two ticks at least
 COLOURS: tuple[Colour, ...] = (GOLD, (0.44, 0.72, 0.36), (0.40, 0.62, 0.86), (0.80, 0.52, 0.78))
 
 
-class Grip(Enum):
-    """Which part of a clip the mouse holds."""
+class DraggedPart(Enum):
+    """Which part of a clip's bar the mouse drags."""
 
     START = "start"
     BODY = "body"
@@ -45,7 +45,7 @@ class _Held:
     """A clip that the mouse drags: as it was when it was taken hold of."""
 
     clip: Clip
-    grip: Grip
+    part: DraggedPart
     from_time: float
 
 
@@ -182,8 +182,8 @@ class Timeline:
         if over or active:
             index = math.floor((mouse.y - at.y - ruler) / row) if mouse.y >= at.y + ruler else -1
             clip_there = every[index] if 0 <= index < len(every) else None
-            held = None if clip_there is None else _grip(clip_there, places, mouse.x, scale)
-            if held in (Grip.START, Grip.END):
+            held = None if clip_there is None else _part_at(clip_there, places, mouse.x, scale)
+            if held in (DraggedPart.START, DraggedPart.END):
                 imgui.set_mouse_cursor(imgui.MouseCursor_.resize_ew)
             wanted = self._first - round(imgui.get_io().mouse_wheel)
             self._first = min(max(wanted, 0), max(len(document.clips) - rows, 0))
@@ -225,13 +225,13 @@ class Timeline:
         paint.add_text(ImVec2(start + 5.0 * scale, top + 3.0 * scale), ink, words)
         paint.pop_clip_rect()
 
-    def _take_hold(self, clip: Clip | None, grip: Grip | None, time: float) -> None:
-        if clip is None or grip is None:
+    def _take_hold(self, clip: Clip | None, part: DraggedPart | None, time: float) -> None:
+        if clip is None or part is None:
             self._scrubs = True
             self.selected = None
             return
         self.selected = clip.id
-        self._held = _Held(clip, grip, time)
+        self._held = _Held(clip, part, time)
 
     def _drag(self, session: LiveSession, time: float) -> None:
         """Go on with what the mouse holds: the moment that is shown, or a clip."""
@@ -243,11 +243,11 @@ class Timeline:
         clip, moved = self._held.clip, time - self._held.from_time
         document = session.session
         try:
-            if self._held.grip is Grip.BODY:
+            if self._held.part is DraggedPart.BODY:
                 dragged, done = edits.moved(document, clip.id, clip.start + moved), "move a clip"
             else:
-                start = clip.start + (moved if self._held.grip is Grip.START else 0.0)
-                end = clip.end + (moved if self._held.grip is Grip.END else 0.0)
+                start = clip.start + (moved if self._held.part is DraggedPart.START else 0.0)
+                end = clip.end + (moved if self._held.part is DraggedPart.END else 0.0)
                 whole = edits.replaced(document, clip)
                 dragged, done = edits.trimmed(whole, clip.id, start, end), "trim a clip"
         except InputError:
@@ -272,17 +272,17 @@ class Timeline:
             session.say(str(error))
 
 
-def _grip(clip: Clip, places: _Scale, x: float, scale: float) -> Grip | None:
+def _part_at(clip: Clip, places: _Scale, x: float, scale: float) -> DraggedPart | None:
     """The part of a clip's bar at x [px]; None beside it."""
     start, end, edge = places.x(clip.start), places.x(clip.end), EDGE * scale
     if not start - edge <= x <= end + edge:
         return None
     if end - start > 4.0 * edge:
         if x < start + edge:
-            return Grip.START
+            return DraggedPart.START
         if x > end - edge:
-            return Grip.END
-    return Grip.BODY
+            return DraggedPart.END
+    return DraggedPart.BODY
 
 
 def _draw_ruler(

@@ -80,7 +80,7 @@ def button(
 
 
 def beside(words: str, gap: float = -1.0) -> None:
-    """Let the next button, with these words on it, stand beside the last one, if it fits there."""
+    """Put the next button, with these words on it, beside the last one, if it fits there."""
     style = imgui.get_style()
     between = style.item_spacing.x if gap < 0.0 else gap
     width = imgui.calc_text_size(words).x + 2.0 * style.frame_padding.x
@@ -90,7 +90,7 @@ def beside(words: str, gap: float = -1.0) -> None:
 
 
 def hint(name: str) -> None:
-    """What the widget before does, and its key, at once while the mouse is over it."""
+    """Show what the last widget does, and its key, while the mouse is over it."""
     if imgui.is_item_hovered():
         key = f"  [{KEY_OF[name]}]" if name in KEY_OF else ""
         imgui.set_tooltip(f"{ACTIONS[name].label}: {ACTIONS[name].text}{key}")
@@ -136,7 +136,7 @@ def dot(colour: Colour, radius: float) -> None:
 
 
 def fitted(text: str, width: float) -> str:
-    """A text that is no wider than `width` [px]: its end is left out where it would be."""
+    """A text that is cut at its end so that it is no wider than `width` [px]."""
     if imgui.calc_text_size(text).x <= width:
         return text
     while text and imgui.calc_text_size(f"{text}…").x > width:
@@ -146,7 +146,7 @@ def fitted(text: str, width: float) -> str:
 
 @contextmanager
 def letters(scale: float) -> Iterator[None]:
-    """Letters so many times as high as usual."""
+    """Text that is this many times as high as usual."""
     imgui.push_font(None, imgui.get_style().font_size_base * scale)
     try:
         yield

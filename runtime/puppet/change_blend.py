@@ -99,7 +99,7 @@ class ChangeBlend:
         self._rest_of_way, self._passed, self._at = state.rest_of_way, state.passed, state.at
 
     def begin(self, targets: Targets, vertices: Array) -> None:
-        """Depart from what is shown with the next frame, if anything is.
+        """Blend from what is shown now, if anything is, from the next frame on.
 
         Args:
             targets: as they were blended.

@@ -110,7 +110,7 @@ class ExpressionMixer:
         self._route = self._route_of(())
 
     def weights(self, blends: Blends | None) -> Array:
-        """Return the weight (T,) in [0, 1] of each morph target; 0 for what does not come."""
+        """Return the weight (T,) in [0, 1] of each morph target; 0 for those that nothing moves."""
         targets = np.zeros(self._count)
         if not blends:
             return targets

@@ -43,7 +43,7 @@ class Motion:
 
 
 class Layers(Protocol):
-    """Motion that is put on what a driver says."""
+    """Motion that is laid over a driver's targets."""
 
     @property
     def shows_driver(self) -> bool:
@@ -135,7 +135,7 @@ class Puppet:
         self.driver = driver
 
     def ease(self) -> None:
-        """Let the next pose depart from what is shown, as after a freeze, whatever changes now."""
+        """Blend the next poses from what is shown now, whatever is about to change."""
         self._change_blend.begin(self._targets, self._standing[0])
 
     def change_at_once(self) -> None:

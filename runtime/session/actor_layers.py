@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, slots=True)
 class Cue:
-    """What an actor is to do at a frame of the show.
+    """What an actor does at a frame of the show.
 
     Attributes:
         session: what plays.
@@ -41,7 +41,7 @@ class Cue:
 
 
 class ActorLayers:
-    """Puts the clips of an actor and its performer on one another, frame by frame.
+    """Stacks the clips of an actor and the motion of its performer, frame by frame.
 
     Args:
         actor: its id in the session.

@@ -106,12 +106,12 @@ def paced(session: Session, number: int, speed: float) -> Session:
 
 
 def looped(session: Session, number: int, passes: float) -> Session:
-    """Let a clip play its take so many times."""
+    """Let a clip play its take this many times, which may be a fraction."""
     return _changed(session, number, passes=passes)
 
 
 def muted(session: Session, number: int, on: bool) -> Session:
-    """Leave a clip out, or not."""
+    """Mute a clip, or not."""
     return _changed(session, number, muted=on)
 
 
@@ -121,7 +121,7 @@ def soloed(session: Session, number: int, on: bool) -> Session:
 
 
 def weighted(session: Session, number: int, weight: float) -> Session:
-    """Let so much of a clip count, in [0, 1]."""
+    """Set the weight of a clip, in [0, 1]."""
     return _changed(session, number, weight=weight)
 
 
@@ -131,7 +131,7 @@ def made_additive(session: Session, number: int, on: bool) -> Session:
 
 
 def eased(session: Session, number: int, ease_in: float, ease_out: float) -> Session:
-    """Let a clip come and go within so many seconds of the session's time.
+    """Blend a clip in and out within these numbers of seconds of the session's time.
 
     Raises:
         InputError: both together are longer than the clip.
@@ -172,7 +172,7 @@ def copied(session: Session, number: int, start: float) -> Session:
 
 
 def raised(session: Session, number: int, layers: int) -> Session:
-    """Put a clip so many layers higher, or lower where negative."""
+    """Move a clip up by this number of layers; down if negative."""
     clip = session.clip(number)
     others = [one for one in session.clips if one is not clip]
     place = min(max(session.clips.index(clip) + layers, 0), len(others))
@@ -187,7 +187,7 @@ def replaced(session: Session, clip: Clip) -> Session:
 
 
 def without_clip(session: Session, number: int) -> Session:
-    """Take a clip away; its take stays."""
+    """Remove a clip; its take stays."""
     clip = session.clip(number)
     return replace(session, clips=tuple(one for one in session.clips if one is not clip))
 
@@ -219,7 +219,7 @@ def marked(session: Session, time: float, name: str) -> Session:
 
 
 def unmarked(session: Session, time: float) -> Session:
-    """Take away the mark that is nearest to `time` [s].
+    """Remove the mark that is nearest to `time` [s].
 
     Raises:
         InputError: there is no mark.

@@ -81,12 +81,12 @@ class LiveSession:
 
     @property
     def session(self) -> Session:
-        """The version that counts now."""
+        """The present version of the session."""
         return self.store.session
 
     @property
     def goes_on(self) -> bool:
-        """Whether the show goes on where no performer sends a frame."""
+        """Whether the show goes on while no performer sends frames."""
         return self.kiosk is not None or self.transport.mode is not Mode.REHEARSING
 
     @property
@@ -97,12 +97,12 @@ class LiveSession:
     # -- Edits -------------------------------------------------------------------------------------
 
     def edit(self, session: Session, done: str) -> None:
-        """Go on to an edited session by one step, and write it to the disk."""
+        """Replace the session by an edited one, as one step, and write it to the disk."""
         self.store.versions.do(session, done)
         self._write()
 
     def drag(self, session: Session, done: str) -> None:
-        """Go on to a session while something is dragged; all of it is one step."""
+        """Replace the session while something is dragged; the whole drag is one step."""
         self.store.versions.drag(session, done)
 
     def drop(self) -> None:
@@ -153,7 +153,7 @@ class LiveSession:
 
     @property
     def performed(self) -> list[ActorLayers]:
-        """The characters that performers move, and that are armed."""
+        """The armed characters that performers move now."""
         return [
             layers
             for layers, one in zip(self._layers, self._staged, strict=True)
@@ -204,7 +204,7 @@ class LiveSession:
         self.transport.go_to(self._start)
 
     def recall(self) -> None:
-        """Make a take of what the performers did in the last seconds, with nothing pressed."""
+        """Make a take of what the performers did in the last seconds."""
         takes = [(layers, layers.recall()) for layers in self._layers]
         made = [(one, each) for one, each in takes if each is not None]
         if not made:
@@ -213,7 +213,7 @@ class LiveSession:
         self._add(made, self.transport.position)
 
     def drop_last(self) -> None:
-        """Take the clips of the newest take away, so that it can be performed again."""
+        """Remove the clips of the newest take, so that it can be performed again."""
         session = self.session
         there = {clip.id for clip in session.clips}
         gone = [number for number in self._last if number in there]

@@ -111,7 +111,7 @@ def blended(below: Placement, over: Placement, weight: float) -> Placement:
 
 
 def added(below: Placement, over: Placement, weight: float) -> Placement:
-    """Return a placement that goes on from one by a share `weight` of another."""
+    """Return a placement, followed by a share `weight` of another."""
     low, high = _clearances(below, over)
     return Placement(
         below.turn + weight * over.turn,

@@ -10,7 +10,7 @@ LONGEST_STEP = 0.25  # [s] that a frame counts for at most
 
 
 class Mode(Enum):
-    """What the time of a session does."""
+    """Whether the time of a session stands, plays or records."""
 
     REHEARSING = "rehearsing"  # it stands still; performers move their characters
     PLAYING = "playing"
@@ -73,7 +73,7 @@ class Transport:
 
     @property
     def moving(self) -> bool:
-        """Whether the time goes by."""
+        """Whether the time runs."""
         return self.mode in (Mode.PLAYING, Mode.RECORDING)
 
     def seek(self, seconds: float) -> None:
@@ -93,7 +93,7 @@ class Transport:
             self.mode = Mode.PAUSED
 
     def go_to(self, seconds: float) -> None:
-        """Go to a moment [s], whatever the time does; before 0 to 0."""
+        """Go to a moment [s], in any mode; before 0 to 0."""
         self._position = max(seconds, 0.0)
 
     def pause(self) -> None:
@@ -101,7 +101,7 @@ class Transport:
         self.mode = Mode.PAUSED
 
     def resume(self) -> None:
-        """Play on; from the front where the end is reached."""
+        """Play on; at the end, from the start."""
         if self._position >= self._length() and not self.loop:
             self._position = 0.0
         self.mode = Mode.PLAYING

@@ -18,7 +18,7 @@ class Step:
 
 
 class Versions:
-    """Keeps the versions of a session. Sessions share what an edit leaves as it was.
+    """Keeps the versions of a session; they share everything that an edit does not change.
 
     Args:
         session: the first version.
@@ -31,7 +31,7 @@ class Versions:
 
     @property
     def session(self) -> Session:
-        """The version that counts now."""
+        """The present version of the session."""
         return self._steps[self._at].session
 
     @property
@@ -45,7 +45,7 @@ class Versions:
         return self._steps[self._at + 1].done if self._at + 1 < len(self._steps) else ""
 
     def do(self, session: Session, done: str) -> None:
-        """Go on to another version by one step. What had been undone is dropped.
+        """Add a version as one step. What had been undone is dropped.
 
         A session that equals the one before is no step.
         """
@@ -56,7 +56,7 @@ class Versions:
         self._at = len(self._steps) - 1
 
     def drag(self, session: Session, done: str) -> None:
-        """Go on to another version; all of a drag, until `drop` or another edit, is one step."""
+        """Add a version of a drag; all of it, until `drop` or another edit, is one step."""
         if self._dragged == done and self._at > 0:
             self._steps[self._at] = Step(session, done)
             return

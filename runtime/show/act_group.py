@@ -145,7 +145,7 @@ class ActGroup:
             number -= len(act.puppets)
 
     def wait(self, on: bool) -> None:
-        """Let nothing that is shown perform by itself while `on`."""
+        """While `on`, let no match start to perform by itself."""
         for act in self._acts:
             act.match_session.waits = on
 

@@ -30,7 +30,7 @@ class LitChain:
 
 
 class Lights(Protocol):
-    """Lights up chains, as while they are chosen by hand; outputs never show it."""
+    """Lights up chains, for example during mapping by hand; outputs never show it."""
 
     def chains(self, number: int) -> Sequence[LitChain]:
         """Return what lights up on a character, by its number; the last lies on top."""

@@ -301,7 +301,7 @@ class ShowSettings:
 
     @property
     def is_noticed(self) -> bool:
-        """Whether anybody gets anything of the show: by a window, file, sender or remote."""
+        """Whether the show has a window, file, sender or remote, so that it has any effect."""
         # Neither of these writes anything by itself.
         files = replace(self.files, export_within=None, video_sound=None)
         asked: list[object] = [

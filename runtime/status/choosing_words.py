@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class ChoosingStatus:
-    """How far choosing by hand is.
+    """The progress of mapping by hand.
 
     Attributes:
         performer: whether the performer is a recording, so that "you" is somebody else.

@@ -112,7 +112,7 @@ class Choosing(Protocol):
 
     @property
     def status(self) -> ChoosingStatus | None:
-        """How far it is; None while nothing is chosen."""
+        """The progress of mapping by hand; None while it is off."""
         ...
 
     def chosen(self, number: int) -> Sequence[DrivenPart]:

@@ -46,7 +46,7 @@ class Handles:
         return len(self.places) == count and not self.hard.any()
 
     def goals_after(self, before: Handles, goals: Floats, x: Floats) -> Floats:
-        """Return where these handles start: at their goals of before, or where x has them.
+        """Return where these handles start: at their previous goals, or at their places in x.
 
         Args:
             before: the handles that these replace.

@@ -27,7 +27,7 @@ _BETTER, _MUCH_BETTER = 0.9, 0.5
 
 @dataclass(frozen=True, slots=True)
 class RestPoseTrials:
-    """What decides whether the rest pose is tried.
+    """The state that decides whether the rest pose is tried.
 
     Attributes:
         frames_since: the frames since the last trial.

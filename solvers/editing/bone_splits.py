@@ -13,7 +13,7 @@ from solvers.skeleton.quaternions import rotate
 
 
 def divided(bone: Bone, at: float) -> tuple[Bone, Bone]:
-    """Divide a bone and its motion: each half turns by its share, both by the whole.
+    """Split a bone and its motion: each half turns by its share, both together by the whole.
 
     Args:
         bone: the bone.
@@ -29,7 +29,7 @@ def divided(bone: Bone, at: float) -> tuple[Bone, Bone]:
 
 
 def parted(bone: Bone, at: float) -> tuple[Bone, Bone]:
-    """Part a bone, with the whole of its motion on either side: both go on turning as it did.
+    """Split a bone in two; each half keeps the whole motion and turns as the bone did.
 
     Args:
         bone: the bone.
@@ -41,7 +41,7 @@ def parted(bone: Bone, at: float) -> tuple[Bone, Bone]:
 
 
 def joined(first: Bone, second: Bone) -> Bone:
-    """Join two bones to a straight one that turns by what both turned.
+    """Join two bones into a straight one that turns by both turns together.
 
     Pieces of one stem become the whole again, to the last bit. Others keep their turns and clips,
     each for its share of the length, so that a node that is put there again parts them again.

@@ -24,7 +24,7 @@ class Laid(NamedTuple):
 
 
 def with_clip(part: Part, chain: Sequence[int], laid: Laid) -> Part:
-    """Lay a clip on a chain of bones, over those that are there: by arc length of the bones.
+    """Put a clip on a chain of bones, on top of others, by arc length of the bones.
 
         o-----o---o        o-----o---o
                            0    .6   1   of the clip

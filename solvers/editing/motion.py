@@ -27,7 +27,7 @@ UNTURNED: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Motion:
-    """Rotations along a unit polyline over time: q(s, t). Two motions are equal if they are one.
+    """Rotations along a unit polyline over time: q(s, t). Motions are compared by identity.
 
     Attributes:
         times: (T,) [s] ascending, from 0.

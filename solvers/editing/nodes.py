@@ -60,7 +60,7 @@ def without_node(part: Part, node: int) -> Part:
 
 
 def with_tip(part: Part, node: int, vector: Vector) -> Part:
-    """Let a bone grow from a node; its end gets the id `part.next_id`. It turns along, stiffly.
+    """Add a bone at a node; its end gets the id `part.next_id`. It turns rigidly with the node.
 
         o-----o        o-----o-----o
         a   node       a   node   new

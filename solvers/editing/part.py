@@ -37,7 +37,7 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Layer:
-    """What a turn takes of a clip.
+    """The part of a clip that a turn uses.
 
     Attributes:
         clip: the clip.

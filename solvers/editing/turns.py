@@ -12,7 +12,7 @@ NOTHING = 1e-12
 
 
 def product(p: Quaternion, q: Quaternion) -> Quaternion:
-    """Return the rotation q, then p; to the last bit where one of them is none."""
+    """Return the rotation q followed by p; exact if one of them is the identity."""
     if p == UNTURNED:
         return q
     if q == UNTURNED:
@@ -33,7 +33,7 @@ def inverse(q: Quaternion) -> Quaternion:
 
 
 def snapped(q: Quaternion) -> Quaternion:
-    """Return q, or no rotation at all where it is one but for rounding."""
+    """Return q, or exactly the identity if q differs from it only by rounding."""
     return UNTURNED if max(abs(q[0]), abs(q[1]), abs(q[2])) < NOTHING else q
 
 

@@ -118,7 +118,7 @@ def save_list(part: str, leave_out: str) -> None:
 
 
 def has_list(part: str, leave_out: str) -> bool:
-    """Whether all files are there and whole that this part needs, for the present kernels.
+    """Whether all files that this part needs for the present kernels are there and intact.
 
     A power cut leaves files empty or full of zeros; they count as missing, like a damaged list.
 

@@ -57,7 +57,7 @@ def norm(a: Vector) -> float:
 
 @kernel
 def unit(a: Vector, otherwise: Vector) -> Vector:
-    """Return the unit vector, or `otherwise` where there is next to no length or no number."""
+    """Return the unit vector, or `otherwise` if the length is nearly 0 or not a number."""
     size = norm(a)
     return scaled(a, 1.0 / size) if size > _SHORTEST else otherwise
 

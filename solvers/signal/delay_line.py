@@ -21,7 +21,7 @@ class DelayLineState:
 
 
 class DelayLine:
-    """Gives each of B rotations as it was its own time ago.
+    """Delays each of B rotations by a time of its own.
 
     Between two frames it turns evenly from one rotation to the next. Of a time before the first
     frame it gives the first.

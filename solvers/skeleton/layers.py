@@ -32,7 +32,7 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LayerFrame:
-    """What one layer makes of D nodes at one moment, between two frames of its motion.
+    """D nodes of one layer at one moment, between two frames of its motion.
 
     Attributes:
         nodes: (D,) the nodes, each once.
@@ -72,11 +72,11 @@ class LayeredNodes:
         self.shifts[:] = 0.0
 
     def override(self, frame: LayerFrame, weight: float) -> None:
-        """Put on a layer that takes its nodes a share `weight` in [0, 1] of the way to its own."""
+        """Add a layer that moves its nodes by a share `weight` in [0, 1] to its own pose."""
         _override(self.turns, self.shifts, *_operands(frame), weight)
 
     def add(self, frame: LayerFrame, weight: float) -> None:
-        """Put on a layer that turns its nodes further, by a share `weight` of its own turns."""
+        """Add a layer that turns its nodes further, by a share `weight` of its own turns."""
         _add(self.turns, self.shifts, *_operands(frame), weight)
 
     def world(self) -> tuple[Array, Array]:
@@ -86,7 +86,7 @@ class LayeredNodes:
         return positions, rotations
 
     def local(self, positions: Array, rotations: Array) -> tuple[Array, Array]:
-        """Return turns (K, 4) and shifts (K, 3) that place the nodes so: `world` reversed.
+        """Return turns (K, 4) and shifts (K, 3) that place the nodes there: the inverse of `world`.
 
         Args:
             positions: (K, 3).

@@ -49,7 +49,7 @@ class LimbPair:
 
     @property
     def root(self) -> int:
-        """The node of the middle line that the first limb hangs on."""
+        """The node of the middle line at which the first limb begins."""
         return self.chains[0][0]
 
 

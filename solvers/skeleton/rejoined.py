@@ -24,7 +24,7 @@ _NEARER = 0.5  # of the loose end's distance from the plane: the trunk is nearer
 
 
 def rejoined(tree: Tree, plane: MirrorPlane, size: float) -> NDArray[np.int64] | None:
-    """Return parents (K,) of the tree with such a limb hung on the trunk; None if there is none.
+    """Return parents (K,) of the tree with such a limb joined to the trunk; None without one.
 
     Args:
         tree: the nodes, in the unit and frame of the plane.

@@ -35,7 +35,7 @@ class CorrectiveShapes:
         return self._rows.reshape(len(self._rows), self._rows.shape[1] // 3, 3)
 
     def add(self, frames: NDArray[np.floating]) -> None:
-        """Add the shapes that frames (F, N, 3) need; F counts in the cube, so pieces are short."""
+        """Add the shapes that frames (F, N, 3) need; the time grows with F cubed."""
         rows = _rows(frames).astype(np.float64)
         missing = self._missing(rows)
         if self._is_beyond(missing):

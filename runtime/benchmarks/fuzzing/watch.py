@@ -39,7 +39,7 @@ class _TooLong(BaseException):
 
 
 class Watch:
-    """Runs the readers and decoders on one input after another, and says what none may do.
+    """Runs the readers and decoders on one input after another, and reports what none may do.
 
     An audit hook stays in the interpreter for good; it is idle between inputs.
 
@@ -54,7 +54,7 @@ class Watch:
         sys.addaudithook(self._audit)
 
     def fault(self, read: Callable[[], None]) -> str:
-        """What `read` did that it may not, in one line; empty if nothing."""
+        """What `read` did that it must not do, in one line; empty if nothing."""
         before, peak = self._noise.tell(), _peak_kib()
         self._seen.clear()
         with warnings.catch_warnings(record=True) as warned:

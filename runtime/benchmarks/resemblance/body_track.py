@@ -109,7 +109,7 @@ def bends(limb: Limb) -> Chain:
 
 
 def off_body(skeleton: Skeleton) -> list[int]:
-    """The joints that carry a body without being of it, such as a root on the floor."""
+    """The joints that carry a body but are not part of it, such as a root on the floor."""
     plan = plan_by_names(skeleton)
     own = range(len(skeleton.names)) if plan is None else skeleton.tree.subtree(plan.hips)
     return sorted(set(range(len(skeleton.names))).difference(own))

@@ -49,7 +49,7 @@ class SurfaceFigures:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Performance:
-    """What a show has left.
+    """What is kept of a show, to be measured.
 
     Attributes:
         performer: as recorded, without any conditioning; None where no body is recognised.

@@ -21,7 +21,7 @@ LEAST_TURN = 3.0  # [degrees], standard deviation; what turns less shows nothing
 def head_yaw_kept(
     performer: BodyTrack, character: BodyTrack, face: tuple[int, int] | None = None
 ) -> float:
-    """How much of the performer's turns of the head against the hips the character makes.
+    """The share of the performer's head turns, relative to the hips, that the character makes.
 
     Args:
         performer, character: the same frames of both.
@@ -48,7 +48,7 @@ def head_yaw_kept(
 
 
 def hand_roll_kept(performer: BodyTrack, character: BodyTrack) -> float:
-    """How much of the performer's roll of the hands about the forearms the character makes.
+    """The share of the roll of the performer's hands about the forearms that the character makes.
 
     The knuckles tell where the body has them, else rotations. NaN where nothing tells.
     """
@@ -72,7 +72,7 @@ def hand_roll_kept(performer: BodyTrack, character: BodyTrack) -> float:
 
 
 def finger_curl_kept(performer: BodyTrack, character: BodyTrack) -> float:
-    """How much of the bending of the performer's fingers the character's make; NaN for none."""
+    """The share of the performer's finger bending that the character makes; NaN for none."""
     source, target = [], []
     for key, theirs in performer.plan.fingers.items():
         ours = character.plan.fingers.get(key)

@@ -19,7 +19,7 @@ MOST_MOMENT = 1e6  # [s] of a session
 
 
 class Once(argparse.Action):
-    """Takes an option once: of two values, the first would be lost in silence."""
+    """Accepts an option only once; else the first of two values would be lost silently."""
 
     def __call__(
         self,

@@ -98,7 +98,7 @@ class Chooser:
             self._scene.lights = None
 
     def accept(self) -> None:
-        """Let the pairs drive from now on, where they are others than before."""
+        """Let the pairs drive from now on, if they have changed."""
         choosing, done = self._choosing, []
         if choosing is None:
             return
@@ -121,7 +121,7 @@ class Chooser:
         self._notices.show("; ".join(done) or "nothing was changed")
 
     def clear(self) -> None:
-        """Take all pairs of the selected character away, or of all."""
+        """Remove all pairs of the selected character, or of all characters."""
         choosing, selected = self._choosing, self._acts.selected
         if choosing is None:
             return
@@ -150,7 +150,7 @@ class Chooser:
         self._at = at
 
     def look(self) -> None:
-        """Light up what lies under the place that is pointed at, where all that moves is now."""
+        """Light up what lies at the place that is pointed at, where everything is now."""
         choosing = self._choosing
         if choosing is None:
             return
@@ -179,7 +179,7 @@ class Chooser:
 
     @property
     def status(self) -> ChoosingStatus | None:
-        """How far it is; None while nothing is chosen."""
+        """The progress of mapping by hand; None while it is off."""
         choosing, scene = self._choosing, self._scene
         if choosing is None or scene is None:
             return None

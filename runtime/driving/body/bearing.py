@@ -25,7 +25,7 @@ _LOWEST = 5.0  # percentile of the heights of a trunk's surface
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Bearing:
-    """What the turns of a performer's trunk do to a character's.
+    """How the turns of a performer's trunk become those of a character's.
 
     Attributes:
         shares: (3,) of the tilts of pelvis, chest and head that the character takes; it turns
@@ -42,7 +42,7 @@ class Bearing:
 
 
 def low_bearing(room: float, half: float) -> Bearing:
-    """Return how a body bears itself that can sink by `room` [m] and is 2 x `half` [m] long."""
+    """Return the bearing of a body that can sink by `room` [m] and is 2 x `half` [m] long."""
     share = np.arcsin(min(room / max(half, 1e-9), 1.0)) / _BOW
     shares = np.minimum([share, share, max(share, _NODS)], 1.0)
     return Bearing(shares, np.tile([0.0, 0.0, 0.0, 1.0], (3, 1)))

@@ -16,7 +16,7 @@ _BESIDE = 0.17  # [m] at most between the chest and an elbow below its shoulder
 
 
 class HeldHands:
-    """Lets hands that meet meet on the character, whose arms begin apart.
+    """Makes the character's hands meet when the performer's meet, although its arms are apart.
 
     A sensor of hands shows one joint for both shoulders. An elbow beside it hangs below its
     shoulder. Where no elbow is known, a hand is seen from the character's shoulder so much farther

@@ -48,7 +48,7 @@ class Path:
         return placed.reshape(points.shape)
 
     def on_stage(self, points: Array) -> Array:
-        """Take points (..., 3) [m] of the character to the stage; the floor is not asked."""
+        """Take points (..., 3) [m] of the character to the stage, without regard to the floor."""
         placed = turned(points.reshape(-1, 3), self.turn, self.hips) + self._travel
         return placed.reshape(points.shape)
 

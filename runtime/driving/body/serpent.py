@@ -62,7 +62,7 @@ class Serpent:
         self._height = self._above_feet(bodies.upright)
 
     def bearing(self, joints: Array) -> Bearing:
-        """Return how the body bears itself for a pose of the performer.
+        """Return the bearing of the body for a pose of the performer.
 
         Args:
             joints: (J, 3) [m] the performer, turned as the character faces.

@@ -80,7 +80,7 @@ class Choosing:
         return Choosing((*others, *wanted))
 
     def released(self) -> Choosing:
-        """Return the same pairs with nothing that waits."""
+        """Return the same pairs, without a chain that waits for its partner."""
         return Choosing(self.pairs)
 
     def cleared(self, character: int) -> Choosing:
@@ -95,7 +95,7 @@ class Choosing:
 def pairs_of(
     driven: Sequence[DrivenPart], character: int, performer: Parts, parts: Parts
 ) -> tuple[Pair, ...]:
-    """Return the pairs that are most like what drives a character; what is like none is left out.
+    """Return the pairs most like the drives of a character; drives unlike any pair are left out.
 
     Args:
         driven: what drives what.

@@ -56,7 +56,7 @@ class Parts:
         return best if best >= 0 and shares[best] >= SAME else None
 
     def named(self, words: str) -> int:
-        """Return the chain that words mean: its name, a beginning of it, or one of its nodes.
+        """Return the chain called so: by its name, the beginning of it, or one of its nodes.
 
         Raises:
             InputError: they mean none, or several.

@@ -90,7 +90,7 @@ class SessionStore:
 
     @property
     def session(self) -> Session:
-        """The version that counts now."""
+        """The present version of the session."""
         return self.versions.session
 
     def adopt(self, characters: Sequence[str]) -> list[str]:
@@ -144,7 +144,7 @@ class SessionStore:
         return "" if self.sound is None else self.folder.keep_sound(self.sound)
 
     def write(self) -> None:
-        """Write the version that counts to the disk, if it is not the one written last.
+        """Write the present version to the disk, if it is not the one written last.
 
         Raises:
             InputError: the disk fails; what was written before stays.

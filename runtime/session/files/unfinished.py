@@ -33,7 +33,7 @@ def begin(recordings: Path, file: str, start: float) -> None:
 
 
 def end(recordings: Path) -> None:
-    """Take the note away: the take is in the session now, or was given up."""
+    """Remove the note: the take is in the session now, or was given up."""
     with writing(recordings / RUNNING):
         (recordings / RUNNING).unlink(missing_ok=True)
 

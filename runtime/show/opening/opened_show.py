@@ -155,7 +155,7 @@ class OpenedShow:
             part.matched(mapping.score, parts, skeleton)
 
     def tell_sight(self) -> None:
-        """Tell when a live performer comes into view, goes or comes back; warn of unusable data."""
+        """Report when a live performer comes, goes or comes back; warn of unusable data."""
         changed = self.watch.changed() if self._recording is None else None
         if changed is not None:
             tell = self._warn if changed[1].sight is Sight.NOT_UNDERSTOOD else self._tell
