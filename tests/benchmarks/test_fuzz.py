@@ -1,4 +1,4 @@
-"""The fuzzer of every door: what it finds in the program, and that it finds what is planted."""
+"""The fuzzer finds no fault in any reader or decoder, and finds planted ones."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the eye sees of tips and ends of limbs, on bodies whose difference is known."""
+"""Measures of the visible tips and ends of limbs, on bodies whose difference is known."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Recordings of strangers: what is bounded before it is believed."""
+"""Untrusted recordings: what is bounded before it is used."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Formats that are known and not read are answered with what converts them, in one line."""
+"""Known formats that are not read are refused with one line that names a converter."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A show in a test's hands: all of it the real thing but the clock of the lights and the window."""
+"""A real show for tests; only the window and the clock of the lights are replaced."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The other machine's clock, found within what is possible to know of it."""
+"""The other machine's clock is estimated within the bound that is possible."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Packets known by their layout say the same as what was learned, but for the numbers."""
+"""A packet with a known layout gives the learned plan with the packet's own numbers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What holds of every recording, whatever file it came from."""
+"""Checks that hold for every recording, whatever file it came from."""
 
 from __future__ import annotations
 

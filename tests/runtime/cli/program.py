@@ -1,4 +1,4 @@
-"""The program as a process of its own, and what its files hold, read by other means than ours."""
+"""Runs the program as a process, and reads its files with other libraries than ours."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Full disks: told at once, the show goes on, and every file that is not whole is named."""
+"""Full disks are reported at once, the show goes on, and every file that is not whole is named."""
 
 from __future__ import annotations
 

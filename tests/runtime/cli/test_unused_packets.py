@@ -1,4 +1,4 @@
-"""A device from which nothing usable comes: the reason is told, and `record` exits with 2."""
+"""A device that sends nothing usable: the reason is said, and `record` exits with 2."""
 
 from __future__ import annotations
 

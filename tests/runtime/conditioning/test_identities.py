@@ -1,4 +1,4 @@
-"""Who is who stays so, whatever numbers the sensor gives."""
+"""Performers keep their numbers, whatever numbers the sensor gives."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A level that fades: where it is, moment by moment."""
+"""Ramps: the value at each moment of a move."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A limb whose performer is lost lets go softly, and takes hold softly again."""
+"""The handles of a limb that is not seen soften smoothly, and become firm again smoothly."""
 
 from __future__ import annotations
 

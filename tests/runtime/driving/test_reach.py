@@ -1,4 +1,4 @@
-"""The room on the stage: the whole way counts, whoever drives, and whatever was tried."""
+"""The space that a character needs: the whole way counts, with any driver and after any trial."""
 
 from __future__ import annotations
 

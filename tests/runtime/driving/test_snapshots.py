@@ -1,4 +1,4 @@
-"""Going back to a snapshot and on from there gives the same bytes as the first time."""
+"""Going on from a restored snapshot gives the same bytes as the first time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The timeline of a session: bars are dragged, cut and selected, and the moment is scrubbed."""
+"""The timeline of a session: bars are dragged, cut and selected, and the ruler goes to a moment."""
 
 from __future__ import annotations
 

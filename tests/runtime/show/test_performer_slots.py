@@ -1,4 +1,4 @@
-"""Whose moves count when several performers are in view."""
+"""Which performer drives when several are in view."""
 
 from __future__ import annotations
 

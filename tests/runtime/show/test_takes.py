@@ -1,4 +1,4 @@
-"""What was recorded once is never recorded over."""
+"""Takes never overwrite an earlier recording."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Mesh files of strangers: what is bounded before it is believed."""
+"""Untrusted mesh files: what is bounded before it is used."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures of strangers beside a mesh: one note at most, and bounded in sum."""
+"""Untrusted pictures beside a mesh: one note at most, and bounded in sum."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The pages of `--help`: the usage line has what must be given, and nothing offered is idle."""
+"""The pages of `--help`: the usage line has what must be given, and every option does something."""
 
 from __future__ import annotations
 

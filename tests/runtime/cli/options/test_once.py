@@ -1,4 +1,4 @@
-"""Options of files are given once: a second value would make the first be lost in silence."""
+"""Options of files can be given only once."""
 
 from __future__ import annotations
 

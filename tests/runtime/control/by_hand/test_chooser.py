@@ -1,4 +1,4 @@
-"""Choosing by hand in a show: what is clicked is what drives, and what is said tells what to do."""
+"""Mapping by hand in a show: clicked pairs drive, and the texts say what to do next."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The driver that moves a body limb by limb: it does what the performer does, whatever the rest."""
+"""The driver that moves a body limb by limb does what the performer does, from any rest pose."""
 
 from __future__ import annotations
 

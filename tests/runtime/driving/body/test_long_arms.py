@@ -1,4 +1,4 @@
-"""Wings that would reach below the floor lie on it; of arms that just do only the hands."""
+"""Wings that would reach below the floor lie on it; of arms that just reach it, only the hands."""
 
 from __future__ import annotations
 
