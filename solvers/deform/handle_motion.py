@@ -182,13 +182,13 @@ def move_along(
             dw, da = dw + m * motions[g, 4], da + m * motions[g, 5]
             db, dc = db + m * motions[g, 6], dc + m * motions[g, 7]
         x0, x1, x2 = x[i, 0], x[i, 1], x[i, 2]
-        moved = _path((w, a, b, c), (dw, da, db, dc), (x0, x1, x2))
+        moved = path((w, a, b, c), (dw, da, db, dc), (x0, x1, x2))
         out[i, 0], out[i, 1], out[i, 2] = x0 + moved[0], x1 + moved[1], x2 + moved[2]
 
 
 @kernel
-def _path(q: Quaternion, d: Quaternion, x: Vector) -> Vector:
-    """The displacement of a point by a dual quaternion q + e d, scalars first, of any length."""
+def path(q: Quaternion, d: Quaternion, x: Vector) -> Vector:
+    """Return the displacement of a point by a dual quaternion q + e d, scalars first."""
     w, a, b, c = q
     dw, da, db, dc = d
     s = 2.0 / (w * w + a * a + b * b + c * c)
@@ -237,7 +237,7 @@ def _farthest(motions: Floats, points: Floats, group_of: Ints) -> tuple[float, f
         if group_of[h] >= 0:
             m = motions[group_of[h]]
             x = (points[h, 0], points[h, 1], points[h, 2])
-            moved = _path((m[0], m[1], m[2], m[3]), (m[4], m[5], m[6], m[7]), x)
+            moved = path((m[0], m[1], m[2], m[3]), (m[4], m[5], m[6], m[7]), x)
             gone = moved[0] * moved[0] + moved[1] * moved[1] + moved[2] * moved[2]
             squared = max(squared, gone)
     return 2.0 * half, math.sqrt(squared)

@@ -4,17 +4,29 @@ Each node has a rigid motion from rest. A vertex follows the blend of the motion
 nodes as dual quaternions (Kavan et al. 2008, Geometric skinning with approximate dual quaternion
 blending, section 3): the blend is rigid itself, so a twisted limb keeps its radius. Of the two
 quaternions of each rotation the one nearer to that of the vertex's strongest node counts.
+
+Where two nodes are turned by half a turn against each other, none is nearer, and the blend would
+leap to the other side of the limb as they pass it. Near there the mean of their motions (linear
+blend skinning) takes its place: it is narrow, but it does not leap.
 """
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Final
 
-from solvers.deform.handle_motion import KEPT, Influences, follow
-from solvers.kernels.compiled import kernel, threads_for
+import numpy as np
+from numba import prange
+from numpy.typing import NDArray
+
+from solvers.deform.handle_motion import KEPT, Influences, follow, path
+from solvers.kernels.compiled import kernel, parallel_kernel, threads_for
 from solvers.kernels.quaternion import Vector, matrix, normalized
+from solvers.kernels.vector import point
 from solvers.linear.laplacian import Floats
 from solvers.surface.skin_weights import Skin
+
+_NEARLY: Final = 0.25  # cosine of half the angle between two nodes below which the mean counts
+_COUNTS: Final = 0.1  # weight from which on a node counts in full for that
 
 
 class SkinnedSurface:
@@ -51,7 +63,37 @@ class SkinnedSurface:
         _motions_of_nodes(self._nodes, positions, rotations, self._motions)
         with threads_for(len(placed)):
             follow(self._rest, self._influences, self._motions, placed)
+            groups, weights = self._influences.groups, self._influences.weights
+            _mean_near_half_turns(self._rest, groups, weights, self._motions, placed)
         return placed
+
+
+@parallel_kernel
+def _mean_near_half_turns(
+    x: Floats, groups: NDArray[np.uint32], weights: Floats, motions: Floats, out: Floats
+) -> None:
+    """Move what has been placed in `out` (N, 3) to the mean of its nodes' motions, as need be."""
+    for i in prange(len(groups)):
+        first, share = groups[i, 0], 0.0
+        for k in range(1, KEPT):
+            g, cosine = groups[i, k], 0.0
+            for axis in range(4):
+                cosine += motions[first, axis] * motions[g, axis]
+            own = (1.0 - abs(cosine) / _NEARLY) * min(weights[i, k] / _COUNTS, 1.0)
+            share = max(share, own)
+        if share <= 0.0:
+            continue
+        rest = point(x, i)
+        a, b, c = rest
+        for k in range(KEPT):
+            m = motions[groups[i, k]]
+            moved = path((m[0], m[1], m[2], m[3]), (m[4], m[5], m[6], m[7]), rest)
+            a += weights[i, k] * moved[0]
+            b += weights[i, k] * moved[1]
+            c += weights[i, k] * moved[2]
+        out[i, 0] += share * (a - out[i, 0])
+        out[i, 1] += share * (b - out[i, 1])
+        out[i, 2] += share * (c - out[i, 2])
 
 
 @kernel

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from scipy.spatial.transform import Rotation
 
 from solvers.deform.skinning import SkinnedSurface
@@ -61,3 +62,24 @@ def test_the_four_strongest_of_many_nodes_count() -> None:
     moved[1] = 1.0
     placed = surface.place(moved, np.tile(UNTURNED[0], (6, 1)))
     np.testing.assert_allclose(placed, 1.0 + 0.3 / 0.95)
+
+
+@pytest.mark.parametrize("axis", [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.6, 0.0, 0.8)])
+def test_no_vertex_leaps_where_nodes_pass_half_a_turn(axis: tuple[float, float, float]) -> None:
+    steps = []
+    before = None
+    for degrees in np.arange(140.0, 221.0, 2.0):
+        turn = Rotation.from_rotvec(np.radians(degrees) * np.array(axis))
+        placed = SURFACE.place(NODES, np.stack([UNTURNED[0], turn.as_quat()]))
+        if before is not None:
+            steps.append(float(np.linalg.norm(placed - before, axis=1).max()))
+        before = placed
+    assert max(steps) < 5.0 * steps[0]  # of the blend alone: over 50 times
+
+
+def test_a_weight_that_hardly_counts_changes_nothing_near_half_a_turn() -> None:
+    weights = np.array([[1.0 - 1e-9, 1e-9]])
+    surface = SkinnedSurface(np.ones((1, 3)), NODES, Skin(np.array([[0, 1]]), weights))
+    half = Rotation.from_rotvec([0.0, np.pi, 0.0])
+    placed = surface.place(NODES, np.stack([UNTURNED[0], half.as_quat()]))
+    np.testing.assert_allclose(placed, 1.0, atol=1e-7)
