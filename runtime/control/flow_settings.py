@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from devices.errors import InputError
 
 MOST_COUNT_IN = 60.0  # [s]
+GESTURES = ("pose", "clap", "raise")
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,12 +17,14 @@ class FlowSettings:
     Attributes:
         count_in: [s] that are counted down before a take begins, and before a match that was
             accepted performs; 0 to 60.
+        hands_free: which gesture of a performer does the next step, one of `GESTURES`; "" for none.
 
     Raises:
         InputError: a value is out of range; the message names the setting.
     """
 
     count_in: float = 0.0
+    hands_free: str = ""
 
     def __post_init__(self) -> None:
         value: object = self.count_in
@@ -30,4 +33,9 @@ class FlowSettings:
             raise InputError(
                 f"FlowSettings.count_in: expected a number from 0 to {MOST_COUNT_IN:g}, "
                 f"got {value!r}"
+            )
+        if self.hands_free and self.hands_free not in GESTURES:
+            raise InputError(
+                f"FlowSettings.hands_free: expected one of {', '.join(GESTURES)}, "
+                f"got {self.hands_free!r}"
             )

@@ -13,6 +13,7 @@ from PIL import Image
 from replay.builtin import builtin_recording
 from runtime.characters.open_character import load_character
 from runtime.control.actions import press
+from runtime.control.flow_settings import FlowSettings
 from runtime.output.files.whole_file import whole_file
 from runtime.panel.panel import Panel
 from runtime.render.context import headless_context, release_headless
@@ -27,7 +28,7 @@ LAYOUTS = 6  # times that the panel is laid out before it is drawn: it finds its
 
 
 def draw_window(folder: Path, size: tuple[int, int]) -> list[str]:
-    """Write matching.jpg, performing.jpg and session.jpg; return a line for each.
+    """Write matching.jpg, performing.jpg, session.jpg and hands-free.jpg; return a line for each.
 
     Args:
         folder: where they are written; made if it is not there.
@@ -45,6 +46,7 @@ def draw_window(folder: Path, size: tuple[int, int]) -> list[str]:
                 ("matching", _match),
                 ("performing", _perform),
                 ("session", _layer),
+                ("hands-free", _gesture),
             )
         ]
     finally:
@@ -56,9 +58,12 @@ def _draw(
 ) -> str:
     """Write a picture of a window in which something was done."""
     with TemporaryDirectory() as folder:
-        store = SessionStore(Path(folder) / "show.bunraku") if stage is _layer else None
+        store = SessionStore(Path(folder) / "show.bunraku") if stage in (_layer, _gesture) else None
         settings = ShowSettings(
-            size=size, match=MatchSettings(rehearse=stage is not _match), origin="wave.mcap"
+            size=size,
+            match=MatchSettings(rehearse=stage is not _match),
+            flow=FlowSettings(hands_free="raise" if stage is _gesture else ""),
+            origin="wave.mcap",
         )
         stream = play(builtin_recording("wave"), every_frame=True, loop=True)
         characters = [load_character("squid")]
@@ -91,6 +96,13 @@ def _match(show: Show) -> None:
 
 def _perform(show: Show) -> None:
     _tick(show, 45)
+
+
+def _gesture(show: Show) -> None:
+    """A gesture ends the take that is recorded."""
+    _tick(show, 20)
+    press("record", show.controls)
+    _tick(show, 60)
 
 
 def _layer(show: Show) -> None:

@@ -21,7 +21,7 @@ from runtime.panel.match_pictures import MatchPictures
 from runtime.panel.sliders import WIDTH as SLIDERS
 from runtime.panel.sliders import draw_sliders
 from runtime.panel.status_card import LEAST as STATUS_LEAST
-from runtime.panel.status_card import draw_countdown, draw_notices, draw_status
+from runtime.panel.status_card import draw_countdown, draw_hands_free, draw_notices, draw_status
 from runtime.panel.timeline import Timeline
 from runtime.status.show_status import ShowStatus
 
@@ -87,6 +87,7 @@ class Panel:
             self._lay_cards(status, margin)
         else:
             draw_notices(controls.notices.current, margin, scale)
+            draw_hands_free(status, margin, scale)
         if not controls.view.help:
             draw_countdown(status, scale)
 

@@ -62,12 +62,25 @@ def draw_status(
             imgui.push_text_wrap_pos(0.0)
             imgui.text(advice(status))
             imgui.pop_text_wrap_pos()
+            _draw_hands_free(status, scale)
         for take in status.recording:
             dot(LACQUER, 6.0 * scale)
             imgui.text(f"recording {take.path.name}: {clock(take.seconds)}, {take.frames} frames")
         below = imgui.get_cursor_screen_pos().y - imgui.get_style().item_spacing.y
         _draw_lines(notices, scale)
     return float(below + imgui.get_style().window_padding.y)
+
+
+def _draw_hands_free(status: ShowStatus, scale: float) -> None:
+    """What gesture does the next step, to be read from two metres, and how much of it is done."""
+    if status.hands_free is None or not status.hands_free[0]:
+        return
+    wanted, progress = status.hands_free
+    with letters(HEADLINE):
+        imgui.push_text_wrap_pos(0.0)
+        imgui.text_colored(ImVec4(*GOLD, 1.0), wanted)
+        imgui.pop_text_wrap_pos()
+    imgui.progress_bar(progress, ImVec2(-1.0, 10.0 * scale), "")
 
 
 def _light(status: ShowStatus) -> Colour:
@@ -101,6 +114,14 @@ def _draw_large(text: str, top: float, opacity: float, scale: float) -> float:
     paint.add_text(ImVec2(at.x + 3.0 * scale, at.y + 3.0 * scale), shade, text)
     paint.add_text(at, imgui.get_color_u32(ImVec4(*PAPER, opacity)), text)
     return float(top + size.y)
+
+
+def draw_hands_free(status: ShowStatus, margin: float, scale: float) -> None:
+    """Draw what gesture does the next step on a card of its own, where no panel is shown."""
+    if status.hands_free is not None and status.hands_free[0]:
+        width = min(WIDTH * scale, imgui.get_io().display_size.x - 2.0 * margin)
+        with card("gesture", margin, margin, width, opacity=0.55):
+            _draw_hands_free(status, scale)
 
 
 def draw_notices(notices: Sequence[Notice], margin: float, scale: float) -> None:

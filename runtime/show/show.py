@@ -139,6 +139,8 @@ class Show:
             self._opened.window_controls.serve()
         if self._opened.remote is not None:
             self._opened.remote.serve(self.controls)
+        if self._opened.hands_free is not None and performed:
+            self._opened.hands_free.follow()
         if self.controls.session is not None:
             self.controls.session.note_setups()
         return performed

@@ -87,6 +87,8 @@ class ShowStatus:
         performers: who is in view, or was.
         choosing: how far choosing by hand is; None while nothing is chosen.
         count_in: what is counted down for, and the seconds left; None while nothing is.
+        hands_free: what gesture does which step, in words, and how much of it is done, in [0, 1];
+            None where no gesture does anything.
     """
 
     origin: str
@@ -100,6 +102,7 @@ class ShowStatus:
     performers: Sequence[PerformerStatus] = ()
     choosing: ChoosingStatus | None = None
     count_in: tuple[Counted, float] | None = None
+    hands_free: tuple[str, float] | None = None
 
     @property
     def matching(self) -> bool:
@@ -120,6 +123,20 @@ class Choosing(Protocol):
         ...
 
 
+class Gestured(Protocol):
+    """Does the next step when a performer makes a gesture."""
+
+    @property
+    def wanted(self) -> str:
+        """What to do for which step, in words; empty where nothing can be asked for now."""
+        ...
+
+    @property
+    def progress(self) -> float:
+        """How much of a gesture is done, in [0, 1]."""
+        ...
+
+
 def status_of(
     origin: str,
     watch: StreamWatch,
@@ -130,6 +147,7 @@ def status_of(
     session: LiveSession | None,
     chooser: Choosing,
     count_in: CountIn,
+    hands_free: Gestured | None,
 ) -> ShowStatus:
     """Return the state of a show as it is now, out of its parts."""
     characters = [status for act in acts for status in _characters(act)]
@@ -152,6 +170,7 @@ def status_of(
         performers=[_performer(act, act.pose) for act in acts if act.pose is not None],
         choosing=choosing,
         count_in=None if (counted := count_in.counted) is None else (counted, count_in.left or 0.0),
+        hands_free=None if hands_free is None else (hands_free.wanted, hands_free.progress),
     )
 
 

@@ -28,7 +28,7 @@ from runtime.cli.options.output_options import (
     sender_settings,
 )
 from runtime.conditioning.switches import STEPS, SWITCHES, for_live, for_recording
-from runtime.control.flow_settings import FlowSettings
+from runtime.control.flow_settings import GESTURES, FlowSettings
 from runtime.render.background import NOTHING, Background
 from runtime.show.settings import (
     DRIVES,
@@ -38,6 +38,8 @@ from runtime.show.settings import (
     RemoteSettings,
     ShowSettings,
 )
+
+HANDS_FREE_COUNT_IN = 3.0  # [s]
 
 
 def add_character_option(group: argparse._ActionsContainer, *, default: str | None = None) -> None:
@@ -124,7 +126,7 @@ def show_settings(options: argparse.Namespace, origin: str) -> ShowSettings:
         files=file_settings(options),
         senders=sender_settings(options),
         remote=_remote(options),
-        flow=FlowSettings(count_in=options.count_in),
+        flow=_flow(options),
         origin=origin,
     )
 
@@ -165,6 +167,15 @@ def _character(options: argparse.Namespace, number: int) -> CharacterSettings:
         stiffness=own("stiffness"),
         energy=own("energy"),
         iterations=options.iterations,
+    )
+
+
+def _flow(options: argparse.Namespace) -> FlowSettings:
+    """Who has no hand free gets time to take their place, unless they say how much."""
+    usual = HANDS_FREE_COUNT_IN if options.hands_free else 0.0
+    return FlowSettings(
+        count_in=usual if options.count_in is None else options.count_in,
+        hands_free=options.hands_free,
     )
 
 
@@ -305,10 +316,17 @@ def _add_match(parser: argparse.ArgumentParser) -> None:
     match.add_argument(
         "--count-in",
         type=count_in,
-        default=0.0,
         metavar="S",
         help="seconds that are counted before a take begins, and before a match that was accepted "
-        "performs (default 0)",
+        "performs (default: 0; 3 with --hands-free)",
+    )
+    match.add_argument(
+        "--hands-free",
+        choices=GESTURES,
+        default="",
+        help="a gesture does the next step: accept the match, begin and end a take, play it; pose: "
+        "arms held out to the sides for 2 s; clap: three claps; raise: a hand held above the head "
+        "(default: none does)",
     )
     match.add_argument(
         "--mapping",

@@ -12,8 +12,10 @@ from replay.recorded_stream import RecordedStream
 from replay.recording import Recording
 from runtime.characters.character import Character
 from runtime.conditioning.switches import asked_for, for_live, for_recording
+from runtime.control.actions import press
 from runtime.control.by_hand.chooser import Chooser
 from runtime.control.count_in import CountIn
+from runtime.control.hands_free import HandsFree
 from runtime.control.remote import PORT, Remote
 from runtime.control.show_controls import ShowControls, View
 from runtime.driving.drivers import LIMB_BY_LIMB, DriverFactory
@@ -66,6 +68,7 @@ class OpenedShow:
         controls: the parts of the show that actions change.
         window_controls: the window's keys and mouse, or None without a window.
         remote: the remote control, or None.
+        hands_free: does the next step when a performer makes a gesture, or None.
         notices: what happened last, for the panel.
         watch: what is seen of the performer.
         acts: each performer with their puppets and their match session.
@@ -132,6 +135,7 @@ class OpenedShow:
         with interrupts_deferred():  # files come last, when nothing else can fail
             self.loop = self._open_loop(outputs)
             self.controls = self._open_controls()
+        self.hands_free = self._open_hands_free()
         self.window_controls = self.display.open_controls(self.scene, self.controls, self.status)
         closing.callback(self.display.make_current)  # for outputs that draw, and for the scene
 
@@ -296,6 +300,10 @@ class OpenedShow:
             view=View() if self._settings.kiosk is None else View(panel=False, full_screen=True),
         )
 
+    def _open_hands_free(self) -> HandsFree | None:
+        kind = self._settings.flow.hands_free
+        return HandsFree(kind, self.acts, self.controls, press) if kind else None
+
     def _open_session(self, matching: ActGroup) -> LiveSession | None:
         if self._store is None:
             return None
@@ -321,4 +329,5 @@ class OpenedShow:
             controls.session,
             controls.chooser,
             controls.count_in,
+            self.hands_free,
         )

@@ -330,3 +330,18 @@ def test_the_state_of_a_show_is_told_whole(show: StagedShow) -> None:
     show.takes.start()
     (take,) = show._opened.status().recording
     assert take.path.name == "out-1.mcap"
+
+
+def test_a_gesture_is_asked_for_with_or_without_the_panel(screen: Screen, show: StagedShow) -> None:
+    for panel in (True, False):
+        show.controls.view.panel = panel
+        pictures = []
+        for progress in (None, 0.0, 0.9):
+            asked = None if progress is None else ("Raise one hand to begin a take", progress)
+            status = replace(show._opened.status(), hands_free=asked)
+            screen.status = lambda status=status: status  # type: ignore[misc]  # a default binds it
+            pictures.append(covered(screen.draw(8)).sum() if progress is None else screen.draw(8))
+        bar = np.abs(pictures[1].astype(int) - pictures[2]).max(axis=2) > 60
+        rows = np.flatnonzero(bar.any(axis=1))
+        assert 0 < len(rows) < 20, "the bar alone grows"
+        assert covered(pictures[1]).sum() > pictures[0] or panel

@@ -53,7 +53,8 @@ def test_every_option_arrives() -> None:
         "--size", "64x48", "--plain", "--background", "#010203", "--fps", "30",
         "--source", "arms", "--performers", "1", "--match", "3", "--mapping", "m.json",
         "--drive", "relative", "--chains", "stop", "--flip", "--in-place", "--volume-gain", "2",
-        "--countdown", "never", "--count-in", "5", "--no-outliers", "--mirror",
+        "--countdown", "never", "--count-in", "5",
+        "--hands-free", "clap", "--no-outliers", "--mirror",
         "--video", "v.mp4", "--frames", "p", "--cache", "c.pc2", "--report", "r.json",
         "--record", "o.mcap", "--export", "e.glb",
         "--virtual-camera", "--ndi", "n", "--spout", "s", "--vmc", "127.0.0.1:1",
@@ -84,10 +85,11 @@ def test_every_option_arrives() -> None:
         ),
         senders=SenderSettings("", "n", "s", ("127.0.0.1", 1), "tcp://127.0.0.1:2", Path("k")),
         remote=RemoteSettings(("127.0.0.1", 3), 4),
-        flow=FlowSettings(count_in=5.0),
+        flow=FlowSettings(count_in=5.0, hands_free="clap"),
         origin="sim://",
     )
     assert settings_of("--transparent").background == NOTHING
+    assert settings_of("--hands-free", "pose").flow == FlowSettings(3.0, "pose")
 
 
 def test_the_demo_has_a_size_and_a_rate_of_its_own() -> None:
