@@ -17,10 +17,11 @@ from solvers.kernels.quaternion import (
     is_rotation,
     multiply,
     normalized,
+    power,
     quaternion,
     rotate,
 )
-from solvers.kernels.vector import across, cross, dot, minus, plus, point, scaled, unit
+from solvers.kernels.vector import across, cross, dot, minus, norm, plus, point, scaled, unit
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -49,7 +50,13 @@ class TrunkJoints(NamedTuple):
     face: Ints
 
 
-def trunk_turns(joints: Array, of: TrunkJoints, upright: Array, before: Array) -> Array:
+ALL: Final = np.ones(2)
+"""Shares by which pelvis and chest are turned at once: wholly."""
+
+
+def trunk_turns(
+    joints: Array, of: TrunkJoints, upright: Array, before: Array, shares: Array = ALL
+) -> Array:
     """Return the world rotations (3, 4) of pelvis, chest and head from standing upright.
 
     Args:
@@ -57,20 +64,25 @@ def trunk_turns(joints: Array, of: TrunkJoints, upright: Array, before: Array) -
         of: which joints show the turns.
         upright: (3, 4) what `orientations` gives for the upright body.
         before: (3, 4) the answer for the frame before, for parts that the joints do not show.
+        shares: (2,) by which pelvis and chest turn from there to where the joints show them.
     """
     out = np.empty((3, 4))
-    _turns(joints, of, upright, before, out)
+    _turns(joints, of, upright, before, shares, out)
     return out
 
 
 @kernel
-def _turns(joints: Array, of: TrunkJoints, upright: Array, before: Array, out: Array) -> None:
+def _turns(
+    joints: Array, of: TrunkJoints, upright: Array, before: Array, shares: Array, out: Array
+) -> None:
     frames = np.zeros((3, 4))
     _orientations(joints, of, frames)
     for part in range(3):
         own = quaternion(frames, part)
         if is_rotation(own):
             turn = normalized(multiply(own, conjugate(quaternion(upright, part))))
+            if part < 2 and shares[part] < 1.0:
+                turn = _part_of_way(quaternion(before, part), turn, shares[part])
         elif part == 2 and of.head >= 0:
             turn = _nod(joints, of, upright, quaternion(out, 1))
         elif part > 0:
@@ -78,6 +90,15 @@ def _turns(joints: Array, of: TrunkJoints, upright: Array, before: Array, out: A
         else:
             turn = quaternion(before, part)
         out[part, 0], out[part, 1], out[part, 2], out[part, 3] = turn
+
+
+@kernel
+def _part_of_way(start: Quaternion, end: Quaternion, share: float) -> Quaternion:
+    """The rotation at a share of the shorter way from one to another."""
+    gap = multiply(conjugate(start), end)
+    if gap[3] < 0.0:
+        gap = (-gap[0], -gap[1], -gap[2], -gap[3])
+    return normalized(multiply(start, power(gap, share)))
 
 
 def orientations(joints: Array, of: TrunkJoints) -> Array:
@@ -144,6 +165,39 @@ def _frame(left: Vector, up: Vector) -> Quaternion:
     if dot(x, x) < 0.5 or dot(y, y) < 0.5:
         return (0.0, 0.0, 0.0, 0.0)
     return from_axes(x, cross(x, y))
+
+
+def levers(joints: Array, of: TrunkJoints) -> Array:
+    """Return the lengths (2, 2) [m] by which the joints show the turns of pelvis and chest.
+
+    The one is from the right to the left of the part; the other is how far the part reaches up,
+    at right angles to it. 0 for a part that the joints do not show.
+    """
+    out = np.zeros((2, 2))
+    _levers(np.ascontiguousarray(joints), of, out)
+    return out
+
+
+@kernel
+def _levers(joints: Array, of: TrunkJoints, out: Array) -> None:
+    hips, shoulders = of.hips, of.shoulders
+    low = _middle(joints, hips[0], hips[1])
+    high = _middle(joints, shoulders[0], shoulders[1])
+    if of.neck >= 0:
+        high = point(joints, of.neck)
+    waist = point(joints, of.waist) if of.waist >= 0 else high
+    if hips[0] >= 0:
+        _measure(_gap(joints, hips[1], hips[0]), minus(waist, low), out, 0)
+    if of.waist < 0:
+        waist = low
+    if shoulders[0] >= 0:
+        _measure(_gap(joints, shoulders[1], shoulders[0]), minus(high, waist), out, 1)
+
+
+@kernel
+def _measure(left: Vector, up: Vector, out: Array, part: int) -> None:
+    x = unit(left, (0.0, 0.0, 0.0))
+    out[part, 0], out[part, 1] = norm(left), norm(minus(up, scaled(x, dot(up, x))))
 
 
 @kernel

@@ -23,6 +23,7 @@ from runtime.driving.body.many_legs import ManyLegs
 from runtime.driving.body.path import Path
 from runtime.driving.body.rearing import Rearing, pitched
 from runtime.driving.body.serpent import Serpent, is_serpent
+from runtime.driving.body.steady_trunk import SteadyTrunk, SteadyTrunkState
 from runtime.driving.body.upright import upright_at_rest, upright_in_poses
 from runtime.driving.body.wings import Wings
 from runtime.driving.driver import Highlight, Needs
@@ -34,7 +35,6 @@ from solvers.retarget.heading import turned
 from solvers.retarget.joint_rotations import RestTurn
 from solvers.retarget.limb_posing import LimbPoser, LimbPoserState, point_hands
 from solvers.retarget.steady_ends import SteadyEnds, SteadyEndsState
-from solvers.retarget.trunk_turns import UPRIGHT, trunk_turns
 from solvers.skeleton.quaternions import multiply, rotate
 
 Array = NDArray[np.float64]
@@ -52,7 +52,7 @@ class BodyState:
         rest: the performer's rest state; None while nothing drives.
         origin: (3,) [m] where the performer's hips were when the character began to travel.
         upright: (3, 4) the orientations of the performer's trunk while standing upright.
-        trunk: (3, 4) the last turns of pelvis, chest and head.
+        trunk: of pelvis, chest and head.
         limbs: of all limbs.
         nodes: the posed nodes.
         rest_turn: what the performer's rotations mean.
@@ -63,7 +63,7 @@ class BodyState:
     rest: Rest | None
     origin: Array
     upright: Array
-    trunk: Array
+    trunk: SteadyTrunkState
     limbs: LimbPoserState
     nodes: PosedNodes
     rest_turn: RestTurn | None
@@ -140,7 +140,7 @@ class BodyDriver:
         self._rest: Rest | None = None
         self._origin: Array | None = None
         self._upright = self._upright_at_rest
-        self._trunk = UPRIGHT
+        self._steady_trunk = SteadyTrunk(parts.trunk)
         self._limbs = LimbPoser(parts.rig)
         self._nodes = skeleton.rest_nodes
 
@@ -181,16 +181,16 @@ class BodyDriver:
         self._limbs.begin(pose.time)
         if self._held_hands is not None:
             self._held_hands.reach_from_shoulders(joints)
-        self._trunk = trunk_turns(joints, self._parts.trunk, self._upright, self._trunk)
+        trunk = self._steady_trunk.turns(joints, self._upright, heading, pose.time)
         rotations, positions = np.empty((len(rig.order), 4)), np.empty((len(rig.order), 3))
         own = self._joint_turns.turns(pose, heading)
         given = self._given(own[:-1], joints)
         if own[-1].any():
-            self._trunk[2] = own[-1]
-        self._trunk[0] = self._levelled(self._trunk[0])
+            trunk[2] = own[-1]
+        trunk[0] = self._levelled(trunk[0])
         self._footing.watch(pose)
-        left = rotate(self._trunk[0], self._left)
-        trunk = self._rearing.reared(self._trunk, joints, left)
+        left = rotate(trunk[0], self._left)
+        trunk = self._rearing.reared(trunk, joints, left)
         if self._serpent is not None:
             trunk = self._serpent.bearing(joints).of(trunk)
         if self._bearing is not None:
@@ -306,7 +306,7 @@ class BodyDriver:
 
     def reset(self) -> None:
         """Forget the poses before: see `Driver.reset`."""
-        self._trunk = UPRIGHT
+        self._steady_trunk.reset()
         self._limbs.reset()
         self._nodes = self._skeleton.rest_nodes
         self._footing.reset()
@@ -327,7 +327,7 @@ class BodyDriver:
             self._rest,
             origin,
             self._upright,
-            self._trunk,
+            self._steady_trunk.snapshot(),
             self._limbs.snapshot(),
             self._nodes,
             self._joint_turns.snapshot(),
@@ -337,7 +337,8 @@ class BodyDriver:
 
     def restore(self, state: BodyState) -> None:
         """Go back to a snapshot."""
-        self._rest, self._trunk, self._nodes = state.rest, state.trunk, state.nodes
+        self._rest, self._nodes = state.rest, state.nodes
+        self._steady_trunk.restore(state.trunk)
         self._origin = None if np.isnan(state.origin).any() else state.origin
         self._upright = state.upright
         self._limbs.restore(state.limbs)
