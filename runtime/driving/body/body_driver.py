@@ -13,6 +13,7 @@ from devices.bodies.plan_by_names import plan_by_names
 from devices.bodies.rest_heading import rest_heading
 from devices.errors import InputError
 from runtime.driving.body.bearing import Bearing, is_low, low_bearing, room_below
+from runtime.driving.body.bent_legs import BentLegs
 from runtime.driving.body.body_parts import TwoBodies, body_parts
 from runtime.driving.body.footing import Footing, FootingState
 from runtime.driving.body.forelegs import Forelegs
@@ -131,7 +132,7 @@ class BodyDriver:
             self._sinking = min(self._ratio * theirs / max(ours, 1e-9), 1.0)
         self._left = np.array([np.cos(bodies.facing), 0.0, -np.sin(bodies.facing)])
         self._footing = Footing(bodies, parts, vertices, owner)
-        self._ends = _ends(bodies)
+        self._ends, self._bent_legs = _ends(bodies), BentLegs(bodies, parts.legs)
         self._held_hands = HeldHands(bodies) if are_held(bodies) else None
         self._rearing, self._wings = Rearing(bodies), Wings(bodies, parts.arms)
         self._forelegs = Forelegs(bodies, parts.arms, (vertices, skeleton.skin), self._ratio)
@@ -198,6 +199,8 @@ class BodyDriver:
         self._footing.turn_soles(joints, left, pose.time, given)
         self._wings.spread(joints, trunk[1], given)
         self._limbs.pose(joints, trunk, given, rotations, positions)
+        if self._bent_legs.follow(joints, positions, rotations, left, given):
+            self._limbs.pose(joints, trunk, given, rotations, positions)
         if self._many_legs is not None:
             self._many_legs.step(joints, positions, rotations, given)
             self._limbs.pose(joints, trunk, given, rotations, positions)
@@ -225,9 +228,8 @@ class BodyDriver:
         ):
             self._limbs.pose(joints, trunk, given, rotations, positions)
         self._nodes = PosedNodes(positions, rotations)
-        shape = self._skeleton.skinned(self._nodes)
         placement = path.placement(self._footing.clearance(pose))
-        return Targets(shape, placement, self._nodes)
+        return Targets(self._skeleton.skinned(self._nodes), placement, self._nodes)
 
     def _on_forelegs(
         self, nodes: tuple[Array, Array], joints: Array, trunk: Array, left: Array, given: Array

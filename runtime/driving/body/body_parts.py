@@ -32,11 +32,13 @@ class Leg:
         source: the performer's hip, knee, ankle and toes; without toes the ankle twice.
         target: the character's.
         segments: numbers of thigh, shin and foot; -1 for a foot that is not driven.
+        is_bent: whether it bends at rest and turns from there.
     """
 
     source: tuple[int, int, int, int]
     target: tuple[int, int, int, int]
     segments: tuple[int, int, int]
+    is_bent: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -206,7 +208,7 @@ def _pointing(bodies: TwoBodies, rig: RigBuilder, least_upright: float) -> _Limb
         segments = rig.add_leg(theirs, ours, drive)
         limbs.parts.append(bodies.part(theirs.chain, ours.chain, drive))
         if theirs.lower and ours.lower:
-            limbs.legs.append(Leg(_bends(theirs), _bends(ours), segments))
+            limbs.legs.append(Leg(_bends(theirs), _bends(ours), segments, drive == RELATIVE))
     if plan.arm_word == "wing":
         limbs.arms.extend(_wings(bodies, rig, limbs.parts))
         return limbs
@@ -245,7 +247,7 @@ def _stepping(bodies: TwoBodies, rig: RigBuilder) -> _Limbs:
             target = ours.upper[0], ours.lower[0], ours.lower[-1]
             limbs.steps.append(Step(side, target, segments, number % 2 == 1, by_arm))
             if pair is plan.legs and limb.lower:
-                limbs.legs.append(Leg(_bends(limb), _bends(ours), (*segments, -1)))
+                limbs.legs.append(Leg(_bends(limb), _bends(ours), (*segments, -1), is_bent=False))
     return limbs
 
 

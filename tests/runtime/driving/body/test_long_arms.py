@@ -25,7 +25,7 @@ NODES = np.array(
     ]
 )
 PARENTS = np.array([-1, 0, 1, 0, 3, 4])
-LEG = Leg((0, 1, 2, 2), (0, 1, 2, 2), (2, 3, -1))
+LEG = Leg((0, 1, 2, 2), (0, 1, 2, 2), (2, 3, -1), is_bent=False)
 LEFT = np.array([1.0, 0.0, 0.0])
 WING = Arm(Side.LEFT, (3, 4, 5), (0, 1), (3, 4), 5)
 

@@ -90,3 +90,15 @@ def test_the_chest_rises_whole_and_pelvis_and_head_half_about_the_left() -> None
     np.testing.assert_allclose(front[:, 1], np.sin(angles), atol=1e-12)
     level = turned.apply([0.0, 0.0, 1.0])[[0, 2]]
     np.testing.assert_allclose(front[:, [0, 2]], np.outer(np.cos(angles), level), atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("body", "lean", "left"),
+    [(DOG, 5.0, 1.25), (DOG, -5.0, -1.25), (DOG, 60.0, 48.0), (PERSON, 5.0, 5.0)],
+)
+def test_an_animal_hardly_leans_with_who_walks_but_bows_with_who_bows(body, lean, left) -> None:
+    half = 0.5 * np.radians(lean)
+    trunk = np.tile([np.sin(half), 0.0, 0.0, np.cos(half)], (3, 1))
+    turned = rearing_of(*body).reared(trunk, with_arms(-90, -90), LEFT)
+    angles = np.degrees(2.0 * np.arctan2(turned[:, 0], turned[:, 3]))
+    np.testing.assert_allclose(angles, [left, left, lean])
