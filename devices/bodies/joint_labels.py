@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from devices.bodies.joint_names import FINGERS, BodyPart, Kind, Limb, Side, part_of_name
+from devices.bodies.joint_names import FINGERS, BodyPart, Kind, LimbName, Side, part_of_name
 from devices.skeleton import Skeleton
 
 _SIDED = (Side.LEFT, Side.RIGHT)
@@ -119,7 +119,7 @@ def _settle_limb(
         if (part := parts[joint]) is not None
         and part.side is side
         and not part.tip
-        and (part.limb is Limb.FORE) is fore
+        and (part.limb is LimbName.FORE) is fore
     ]
 
     def joints(*words: str) -> list[int]:
@@ -151,11 +151,11 @@ def _settle_pairs(parts: list[BodyPart | None], side: Side, skeleton: Skeleton) 
     The joints of a wing are no arm beside arms or forelegs.
     """
 
-    def of(kinds: Sequence[Kind], limb: Limb) -> bool:
+    def of(kinds: Sequence[Kind], limb: LimbName) -> bool:
         return any(p and p.side is side and p.kind in kinds and p.limb is limb for p in parts)
 
-    armed = of(_ARM, Limb.PLAIN)
-    four_legged = not armed and of(_LEG, Limb.FORE)
+    armed = of(_ARM, LimbName.PLAIN)
+    four_legged = not armed and of(_LEG, LimbName.FORE)
     for joint in skeleton.order:
         part = parts[joint]
         if part is None or part.side is not side or not (armed or four_legged):
@@ -163,9 +163,9 @@ def _settle_pairs(parts: list[BodyPart | None], side: Side, skeleton: Skeleton) 
         parent = int(skeleton.parents[joint])
         above = parts[parent] if parent >= 0 else None
         on_arm = above is not None and above.side is side and above.kind in _ARM
-        if part.limb is Limb.WING and part.kind in (Kind.SHOULDER, *_ARM):
+        if part.limb is LimbName.WING and part.kind in (Kind.SHOULDER, *_ARM):
             parts[joint] = replace(part, kind=Kind.WING)
-        elif part.kind in _ARM_OF_LEG and (on_arm or (four_legged and part.limb is Limb.FORE)):
+        elif part.kind in _ARM_OF_LEG and (on_arm or (four_legged and part.limb is LimbName.FORE)):
             parts[joint] = replace(part, kind=_ARM_OF_LEG[part.kind])
 
 

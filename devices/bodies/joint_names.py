@@ -54,7 +54,7 @@ class Kind(StrEnum):
     HELPER = "helper"
 
 
-class Limb(StrEnum):
+class LimbName(StrEnum):
     """Which limb of a creature a name says: one of two pairs of legs, a wing or a fin."""
 
     PLAIN = ""
@@ -87,7 +87,7 @@ class BodyPart:
     tip: bool = False
     word: str = ""
     number: int | None = None
-    limb: Limb = Limb.PLAIN
+    limb: LimbName = LimbName.PLAIN
 
 
 def _listed(words: str) -> list[str]:
@@ -160,13 +160,18 @@ _PREFIX = re.compile(r"^(Bip\d+|ValveBiped|CC_Base|mixamorig\d*)[ _.]+", re.IGNO
 # The pair of legs that a name says, alone ("front_thigh", "FL_foot") or joined with a word of the
 # leg ("foreleg").
 _PAIRS = {
-    **dict.fromkeys(("front", "fore", "frnt"), Limb.FORE),
-    **dict.fromkeys(("mid", "middle"), Limb.MIDDLE),
-    **dict.fromkeys(("hind", "back", "rear"), Limb.HIND),
+    **dict.fromkeys(("front", "fore", "frnt"), LimbName.FORE),
+    **dict.fromkeys(("mid", "middle"), LimbName.MIDDLE),
+    **dict.fromkeys(("hind", "back", "rear"), LimbName.HIND),
 }
 _CORNERS = {
     letter + side: (pair, side)
-    for letter, pair in (("f", Limb.FORE), ("b", Limb.HIND), ("h", Limb.HIND), ("r", Limb.HIND))
+    for letter, pair in (
+        ("f", LimbName.FORE),
+        ("b", LimbName.HIND),
+        ("h", LimbName.HIND),
+        ("r", LimbName.HIND),
+    )
     for side in ("l", "r")
 }
 _OF_A_LEG = {
@@ -204,32 +209,36 @@ def part_of_name(name: str) -> BodyPart | None:
         return None
     kind = _KIND_OF_WORD[word]
     if kind is Kind.WING or "wing" in words:
-        limb = Limb.WING
+        limb = LimbName.WING
     elif kind is Kind.FIN:
-        limb = Limb.FIN
+        limb = LimbName.FIN
     return BodyPart(kind, side, tip, word, digits[0] if digits else None, limb)
 
 
-def _take_pair(words: list[str]) -> tuple[list[str], Limb]:
+def _take_pair(words: list[str]) -> tuple[list[str], LimbName]:
     """Remove the word for a pair of legs, where the rest of the name is a part of a leg."""
     if len(words) > 2 and words[0] == "r" and words[-1] in ("l", "r"):
-        return words[1:], Limb.HIND  # a horse of Rigify: "r_toe.L"
+        return words[1:], LimbName.HIND  # a horse of Rigify: "r_toe.L"
     for place, word in enumerate(words):
         rest = [*words[:place], *words[place + 1 :]]
         if word in _CORNERS and not _OF_A_LEG.isdisjoint(rest):
             limb, side = _CORNERS[word]
             return [*rest, side], limb
-        limb = _PAIRS.get(word, Limb.PLAIN)
-        known = _OF_A_MIDDLE_LEG if limb is Limb.MIDDLE else _OF_A_LEG
-        if limb is not Limb.PLAIN and not known.isdisjoint(rest):
+        limb = _PAIRS.get(word, LimbName.PLAIN)
+        known = _OF_A_MIDDLE_LEG if limb is LimbName.MIDDLE else _OF_A_LEG
+        if limb is not LimbName.PLAIN and not known.isdisjoint(rest):
             return rest, limb
-        if limb is not Limb.PLAIN and word != "back" and not _ONLY_OF_PAIRS.keys().isdisjoint(rest):
+        if (
+            limb is not LimbName.PLAIN
+            and word != "back"
+            and not _ONLY_OF_PAIRS.keys().isdisjoint(rest)
+        ):
             return [_ONLY_OF_PAIRS.get(other, other) for other in rest], limb
         for pair, limb in _PAIRS.items():
-            known = _OF_A_MIDDLE_LEG if limb is Limb.MIDDLE else _OF_A_LEG
+            known = _OF_A_MIDDLE_LEG if limb is LimbName.MIDDLE else _OF_A_LEG
             if word.startswith(pair) and word.removeprefix(pair) in known:
                 return [*words[:place], word.removeprefix(pair), *words[place + 1 :]], limb
-    return words, Limb.PLAIN
+    return words, LimbName.PLAIN
 
 
 def _take_side(words: list[str]) -> tuple[list[str], Side]:

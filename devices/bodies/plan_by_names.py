@@ -10,8 +10,7 @@ import numpy as np
 from devices.bodies.body_plan import SIDES, BodyPlan, Chain, Limb
 from devices.bodies.hand_plan import body_of_hands
 from devices.bodies.joint_labels import first_of, label_joints
-from devices.bodies.joint_names import FINGERS, BodyPart, Kind, Side, part_of_name
-from devices.bodies.joint_names import Limb as LimbName
+from devices.bodies.joint_names import FINGERS, BodyPart, Kind, LimbName, Side, part_of_name
 from devices.bodies.limb_segments import arm_segments, bend_between, leg_segments, neck_and_head
 from devices.skeleton import Skeleton
 

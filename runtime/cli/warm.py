@@ -35,7 +35,7 @@ from runtime.show.show import Show
 from runtime.status.progress import Progress
 from solvers.arap import ENERGIES
 from solvers.deform.skinning import SkinnedSurface
-from solvers.editing.clips_on_chains import Laid, with_clip
+from solvers.editing.clips_on_chains import LaidClip, with_clip
 from solvers.editing.motion import Clip, Motion
 from solvers.editing.part import part_of
 from solvers.editing.part_pose import pose_at
@@ -172,7 +172,7 @@ def _pose_part(points: NDArray[np.float64]) -> None:
     clip = Clip(Motion(np.zeros(1), np.array([0.0, 1.0]), still))
     part = part_of(points, np.array([-1, 0]))
     for _ in range(2):
-        part = with_clip(part, (0, 1), Laid(clip, 0.0, 1.0))
+        part = with_clip(part, (0, 1), LaidClip(clip, 0.0, 1.0))
     pose_at(part, 0.0)
 
 

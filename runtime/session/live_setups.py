@@ -25,7 +25,7 @@ ONE_STEP = 1.0  # [s] between changes of a slider that are undone as one
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Seen:
+class SetupInShow:
     """A setup as the show has it."""
 
     match: MatchSetup
@@ -51,10 +51,10 @@ class ActorSetup:
         self._seen = self.seen
 
     @property
-    def seen(self) -> Seen:
+    def seen(self) -> SetupInShow:
         """The setup as it is now."""
         puppet = self.puppet
-        return Seen(self._match.setup, puppet.surface.elasticity, puppet.travel.in_place)
+        return SetupInShow(self._match.setup, puppet.surface.elasticity, puppet.travel.in_place)
 
     def changed(self, setup: Setup) -> tuple[Setup, str] | None:
         """Return the document's setup with what has changed in the show since the last call.
@@ -228,7 +228,7 @@ class LiveSetups:
             self._warn(str(error))
 
 
-def _asked_before(now: Seen, setup: Setup) -> Setup:
+def _asked_before(now: SetupInShow, setup: Setup) -> Setup:
     """The setup with what the show was asked for by options in place of what it says itself."""
     asked = now.elasticity != RIGID
     elasticity = now.elasticity if asked else setup.elasticity

@@ -46,7 +46,7 @@ class Sighting:
 
 
 @runtime_checkable
-class Counted(Protocol):
+class CountedStream(Protocol):
     """A live stream that counts what comes."""
 
     @property
@@ -90,7 +90,7 @@ class StreamWatch:
 
     def look(self) -> Sighting:
         """Return what is seen now."""
-        traffic = self._stream.traffic if isinstance(self._stream, Counted) else Traffic()
+        traffic = self._stream.traffic if isinstance(self._stream, CountedStream) else Traffic()
         now = self._clock()
         sight = self._sight_now(traffic)
         if sight is not self._sight:

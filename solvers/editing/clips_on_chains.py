@@ -10,7 +10,7 @@ from solvers.editing.motion import Clip
 from solvers.editing.part import Bone, Layer, Node, Part
 
 
-class Laid(NamedTuple):
+class LaidClip(NamedTuple):
     """A clip on a chain.
 
     Attributes:
@@ -23,7 +23,7 @@ class Laid(NamedTuple):
     last: float
 
 
-def with_clip(part: Part, chain: Sequence[int], laid: Laid) -> Part:
+def with_clip(part: Part, chain: Sequence[int], laid: LaidClip) -> Part:
     """Put a clip on a chain of bones, on top of others, by arc length of the bones.
 
         o-----o---o        o-----o---o
@@ -46,7 +46,7 @@ def with_clip(part: Part, chain: Sequence[int], laid: Laid) -> Part:
         first = _between(laid, passed / whole)
         passed += length
         last = laid.last if node is ends[-1] else _between(laid, passed / whole)
-        part = part.with_bone(node.id, _laid_on(node.bone, Laid(laid.clip, first, last)))
+        part = part.with_bone(node.id, _laid_on(node.bone, LaidClip(laid.clip, first, last)))
     return part
 
 
@@ -62,7 +62,7 @@ def without_clip(part: Part, clip: Clip) -> Part:
     return replace(part, nodes=tuple(nodes))
 
 
-def clips_on(part: Part, chain: Sequence[int]) -> tuple[Laid, ...]:
+def clips_on(part: Part, chain: Sequence[int]) -> tuple[LaidClip, ...]:
     """Return the clips on a chain, to be laid on another: a copy of its motion.
 
     Each with the parameters at which it comes onto the chain and leaves it.
@@ -70,12 +70,12 @@ def clips_on(part: Part, chain: Sequence[int]) -> tuple[Laid, ...]:
     Raises:
         ValueError: as of `with_clip`.
     """
-    found: dict[Clip, Laid] = {}
+    found: dict[Clip, LaidClip] = {}
     for node in _bones(part, chain):
         for turn in node.bone.turns:
             for layer in turn.layers:
-                first = found.get(layer.clip, Laid(layer.clip, layer.first, layer.last)).first
-                found[layer.clip] = Laid(layer.clip, first, layer.last)
+                first = found.get(layer.clip, LaidClip(layer.clip, layer.first, layer.last)).first
+                found[layer.clip] = LaidClip(layer.clip, first, layer.last)
     return tuple(found.values())
 
 
@@ -102,11 +102,11 @@ def _bones(part: Part, chain: Sequence[int]) -> list[Node]:
     return ends
 
 
-def _between(laid: Laid, share: float) -> float:
+def _between(laid: LaidClip, share: float) -> float:
     return laid.first + share * (laid.last - laid.first)
 
 
-def _laid_on(bone: Bone, laid: Laid) -> Bone:
+def _laid_on(bone: Bone, laid: LaidClip) -> Bone:
     span = bone.end - bone.start
     turns = []
     for begin, end, turn in bone.spans():

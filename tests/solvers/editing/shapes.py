@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from solvers.editing.bending import bent
-from solvers.editing.clips_on_chains import Laid, with_clip
+from solvers.editing.clips_on_chains import LaidClip, with_clip
 from solvers.editing.motion import Clip, Motion, Quaternion
 from solvers.editing.part import Part, part_of
 from solvers.editing.part_pose import pose_at
@@ -53,7 +53,7 @@ def some_part(random: np.random.Generator, nodes: int = 8, clips: int = 3) -> Pa
         first, last = random.uniform(0.0, 1.0, 2) if random.random() < 0.5 else (0.0, 1.0)
         clip = some_clip(random, motions[int(random.integers(2))])
         chain = [node.id for node in way[begin:]]
-        part = with_clip(part, chain, Laid(clip, float(first), float(last)))
+        part = with_clip(part, chain, LaidClip(clip, float(first), float(last)))
     for _ in range(2):
         part = bent(part, int(random.integers(0, nodes)), some_quaternion(random), 0.4)
     return part

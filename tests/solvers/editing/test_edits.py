@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 
 from solvers.editing.bending import bent
 from solvers.editing.clips_on_chains import (
-    Laid,
+    LaidClip,
     clips_on,
     parameters_at,
     with_clip,
@@ -235,8 +235,8 @@ def graft_of_figure_13() -> tuple[Part, Clip, Clip]:
     random = np.random.default_rng(5)
     orange, cyan = (Clip(some_motion(random)) for _ in range(2))
     line = np.array([[0.0, 0, 0], [2, 0, 0]])
-    base = with_clip(part_of(line, np.array([-1, 0])), (0, 1), Laid(orange, 0.0, 0.6))
-    other = with_clip(part_of(line[::-1], np.array([-1, 0])), (0, 1), Laid(cyan, 0.3, 1.0))
+    base = with_clip(part_of(line, np.array([-1, 0])), (0, 1), LaidClip(orange, 0.0, 0.6))
+    other = with_clip(part_of(line[::-1], np.array([-1, 0])), (0, 1), LaidClip(cyan, 0.3, 1.0))
     there = moved(other, tuple((pose_at(base, 0.5).position(1) - other.place).tolist()))
     return merged(base, there, 1, 0.5), orange, cyan
 
@@ -313,8 +313,8 @@ def test_motion_is_copied_to_another_chain_and_taken_off() -> None:
     whole = [part.node(chain[0]).id, *chain[1:]]
     assert clips_on(part, whole)[0].clip == clip
     line = part_of(np.column_stack([np.arange(4.0), *np.zeros((2, 4))]), np.arange(-1, 3))
-    pasted = with_clip(line, range(4), Laid(clip, 0.0, 1.0))
-    assert clips_on(pasted, range(4)) == (Laid(clip, 0.0, 1.0),)
+    pasted = with_clip(line, range(4), LaidClip(clip, 0.0, 1.0))
+    assert clips_on(pasted, range(4)) == (LaidClip(clip, 0.0, 1.0),)
     assert without_clip(pasted, clip) == line
     assert_array_equal(modelled_pose(pasted).positions, pose_at(line, 0.5).positions)
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.spatial.transform import Rotation, Slerp
 
-from solvers.editing.clips_on_chains import Laid, with_clip
+from solvers.editing.clips_on_chains import LaidClip, with_clip
 from solvers.editing.motion import Clip, Motion, motion_of_bones
 from solvers.editing.part import part_of
 from solvers.editing.part_pose import pose_at
@@ -29,7 +29,7 @@ def angles_of(motion: Motion, count: int, time: float) -> np.ndarray:
     """The world angles [rad] about z of `count` equal bones that play a motion."""
     line = np.column_stack([np.arange(count + 1.0), np.zeros((count + 1, 2))])
     part = part_of(line, np.arange(-1, count))
-    part = with_clip(part, range(count + 1), Laid(Clip(motion), 0.0, 1.0))
+    part = with_clip(part, range(count + 1), LaidClip(Clip(motion), 0.0, 1.0))
     return Rotation.from_quat(pose_at(part, time).rotations[1:]).as_rotvec()[:, 2]
 
 
