@@ -297,7 +297,7 @@ def _add_driving(parser: argparse.ArgumentParser) -> None:
 def _add_match(parser: argparse.ArgumentParser) -> None:
     match = parser.add_argument_group(
         "how performers are matched to characters",
-        "With --drive auto, each of these but --countdown selects matched chains.",
+        "With --drive auto, --match, --mapping, --chains stop and --flip select matched chains.",
     )
     match.add_argument(
         "--match",
