@@ -13,6 +13,7 @@ from scipy.spatial import KDTree
 
 from solvers.editing.surface.blade import Blade, plane
 from solvers.editing.surface.caps import filled, nested
+from solvers.editing.surface.compacting import compact
 from solvers.editing.surface.crossings import crossed_round
 from solvers.editing.surface.rims import rim_edge, rims, sides
 from solvers.editing.surface.sheet import Array, Derived, Flags, Indices, Sheet
@@ -175,7 +176,7 @@ def _side(whole: Split, mine: Flags, caps: Sequence[_Cap], *, below: bool) -> De
             rows[here] = those[tree.query(everywhere[wanted[here, 0]])[1]]
         of_copies.append(csr_array(whole.of_copies[rows]))
     added = sum(len(cap.new) for cap in caps)
-    return _compact(
+    return compact(
         Derived(
             Sheet(np.concatenate(vertices), np.concatenate(vertex), np.concatenate(faces)),
             csr_array(vstack(of_vertices)),
@@ -193,19 +194,3 @@ def _charts(sheet: Sheet) -> Indices:
     links = coo_array((np.ones(len(rows)), (rows, columns)), shape=size)
     found: Indices = connected_components(links, directed=False)[1].astype(np.int64)
     return found
-
-
-def _compact(whole: Derived) -> Derived:
-    """The surface without vertices and copies that no face uses."""
-    copies, faces = np.unique(whole.sheet.faces, return_inverse=True)
-    kept, vertex = np.unique(whole.sheet.vertex[copies], return_inverse=True)
-    sheet = Sheet(
-        whole.sheet.vertices[kept], vertex.reshape(-1), faces.reshape(-1, 3).astype(np.int64)
-    )
-    return Derived(
-        sheet,
-        csr_array(whole.of_vertices[kept]),
-        csr_array(whole.of_copies[copies]),
-        whole.of_faces,
-        whole.seam[kept],
-    )
