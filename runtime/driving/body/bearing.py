@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from runtime.driving.body.body_parts import TwoBodies
-from solvers.skeleton.quaternions import conjugate, multiply
+from solvers.skeleton.quaternions import conjugate, multiply, rotate
 
 Array = NDArray[np.float64]
 
+_LEVEL = 0.3  # least level share of the axis through both hips, of a body that stands
 _BOW = np.radians(60.0)  # as deep as performers bow
 _NODS = 0.35  # a head nods at least by this share
 _NO_YAW = 1e-6
@@ -46,6 +47,29 @@ def low_bearing(room: float, half: float) -> Bearing:
     share = np.arcsin(min(room / max(half, 1e-9), 1.0)) / _BOW
     shares = np.minimum([share, share, max(share, _NODS)], 1.0)
     return Bearing(shares, np.tile([0.0, 0.0, 0.0, 1.0], (3, 1)))
+
+
+def levelled(pelvis: Array, sinking: float, left: Array) -> Array:
+    """Return the turn (4,) of a pelvis that sinks on one side as the performer's, in leg lengths.
+
+    Hips that are wider would lift one foot off the floor, and the body with the other.
+
+    Args:
+        pelvis: (4,) the turn of the performer's pelvis.
+        sinking: the share of the sine of its roll that the character's takes.
+        left: (3,) unit, the body's left at rest.
+    """
+    if sinking == 1.0:
+        return pelvis
+    left = rotate(pelvis, left)
+    sine = float(left[1])
+    lower = np.arcsin(np.clip(sinking * sine, -1.0, 1.0)) - np.arcsin(np.clip(sine, -1.0, 1.0))
+    front = np.array([-left[2], 0.0, left[0]])
+    long = float(np.linalg.norm(front))
+    if long < _LEVEL:
+        return pelvis
+    half = 0.5 * lower
+    return multiply(np.append(np.sin(half) / long * front, np.cos(half)), pelvis)
 
 
 def is_low(bodies: TwoBodies, room: float, half: float) -> bool:

@@ -12,7 +12,7 @@ from devices.bodies.body_plan import SIDES
 from devices.bodies.plan_by_names import plan_by_names
 from devices.bodies.rest_heading import rest_heading
 from devices.errors import InputError
-from runtime.driving.body.bearing import Bearing, is_low, low_bearing, room_below
+from runtime.driving.body.bearing import Bearing, is_low, levelled, low_bearing, room_below
 from runtime.driving.body.bent_legs import BentLegs
 from runtime.driving.body.body_parts import TwoBodies, body_parts
 from runtime.driving.body.footing import Footing, FootingState
@@ -36,11 +36,10 @@ from solvers.retarget.heading import turned
 from solvers.retarget.joint_rotations import RestTurn
 from solvers.retarget.limb_posing import LimbPoser, LimbPoserState, point_hands
 from solvers.retarget.steady_ends import SteadyEnds, SteadyEndsState
-from solvers.skeleton.quaternions import multiply, rotate
+from solvers.skeleton.quaternions import rotate
 
 Array = NDArray[np.float64]
 
-_LEVEL = 0.3  # least level share of the axis through both hips, of a body that stands
 _FORELEGS_REACH = np.array([1.0, 1.0, 0.0])  # pelvis and chest; the head looks where it looked
 _MEASURED = 64  # poses of a clip in which the upright body is measured
 
@@ -252,25 +251,6 @@ class BodyDriver:
             put(positions, rotations, given)
             self._limbs.pose(joints, trunk, given, rotations, positions)
         return trunk
-
-    def _levelled(self, pelvis: Array) -> Array:
-        """The turn (4,) of a pelvis that sinks on one side as the performer's, in leg lengths.
-
-        Hips that are wider would lift one foot off the floor, and the body with the other.
-        """
-        if self._sinking == 1.0:
-            return pelvis
-        left = rotate(pelvis, self._left)
-        sine = float(left[1])
-        lower = np.arcsin(np.clip(self._sinking * sine, -1.0, 1.0)) - np.arcsin(
-            np.clip(sine, -1.0, 1.0)
-        )
-        front = np.array([-left[2], 0.0, left[0]])
-        long = float(np.linalg.norm(front))
-        if long < _LEVEL:
-            return pelvis
-        half = 0.5 * lower
-        return multiply(np.append(np.sin(half) / long * front, np.cos(half)), pelvis)
 
     def _given(self, hands: Array, joints: Array) -> Array:
         """The rotations (S, 4) of the hands, as the performer's rotations (S, 4) turn them.
