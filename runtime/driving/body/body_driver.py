@@ -187,7 +187,7 @@ class BodyDriver:
         given = self._given(own[:-1], joints)
         if own[-1].any():
             trunk[2] = own[-1]
-        trunk[0] = self._levelled(trunk[0])
+        trunk[0] = levelled(trunk[0], self._sinking, self._left)
         self._footing.watch(pose)
         left = rotate(trunk[0], self._left)
         trunk = self._rearing.reared(trunk, joints, left)
