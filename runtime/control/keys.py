@@ -65,6 +65,7 @@ KEYS = {
     "f2": "save",
     "f3": "loop",
     "f4": "half-speed",
+    "f10": "onion-skin",
     "f5": "next-count-in",
     "f6": "map-by-hand",
     "f7": "widest-view",

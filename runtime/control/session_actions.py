@@ -52,6 +52,13 @@ def _half_speed(controls: ShowControls, on: bool) -> None:
         controls.session.transport.speed = 0.5 if on else 1.0
 
 
+def _onion_skin(controls: ShowControls, on: bool) -> None:
+    if controls.session is None:
+        controls.notices.show(NO_SESSION)
+    elif controls.scene is not None:
+        controls.scene.ghosts = controls.session.ghosts if on else None
+
+
 def _loop(controls: ShowControls, on: bool) -> None:
     if controls.playback is not None:
         controls.playback.loop = on
@@ -88,6 +95,13 @@ SESSION_ACTIONS: Mapping[str, Action] = {
         "run the session's time at half speed, also while a take is recorded",
         lambda controls: controls.session is not None and controls.session.transport.speed < 1.0,
         _half_speed,
+    ),
+    "onion-skin": switch(
+        "Onion skin",
+        "in a pause, show the moments just before and after (in a session)",
+        lambda controls: controls.scene is not None and controls.scene.ghosts is not None,
+        _onion_skin,
+        done=("in a pause, the moments before are blue, those after orange", "no onion skin"),
     ),
     "loop": switch(
         "Loop",

@@ -45,6 +45,7 @@ GROUPS: dict[str, tuple[str, ...]] = {
         "recall",
         "save",
         "half-speed",
+        "onion-skin",
     ),
     "Look": (
         "help",

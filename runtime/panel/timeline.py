@@ -110,6 +110,7 @@ class Timeline:
         _next("retake", controls, icons.ICON_FA_ARROWS_ROTATE)
         _next("recall", controls, icons.ICON_FA_CLOCK_ROTATE_LEFT)
         _next("save", controls, icons.ICON_FA_FLOPPY_DISK, label="")
+        _next("onion-skin", controls, icons.ICON_FA_GHOST, label="")
         clip = self._chosen(session.session)
         if clip is not None:
             beside("mute", 24.0 * scale)

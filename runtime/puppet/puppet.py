@@ -13,7 +13,7 @@ from runtime.characters.character import Character
 from runtime.characters.proxy import proxy_of
 from runtime.driving.driver import Driver, Highlight
 from runtime.driving.performer import Pose
-from runtime.driving.targets import HandleTargets, PosedNodes, SkinnedTargets, Targets
+from runtime.driving.targets import HandleTargets, Placement, PosedNodes, SkinnedTargets, Targets
 from runtime.puppet.bound_skeleton import BoundSkeleton
 from runtime.puppet.change_blend import ChangeBlend, ChangeBlendState
 from runtime.puppet.deformable_surface import DeformableSurface, SurfaceState
@@ -256,6 +256,16 @@ class Puppet:
         if driver is None:
             return []
         return [replace(each, points=place(each.points)) for each in driver.highlights]
+
+    def stood(self, skinned: SkinnedTargets, placement: Placement) -> Array:
+        """Return where a skin puts the character (N, 3) [m] on the stage; nothing else changes.
+
+        The surface is not made even, and the face is at rest.
+        """
+        standing = np.empty_like(self._standing[0])
+        vertices = self.surface.cover(skinned.positions)
+        put_on_stage(vertices, self.travel.of(placement), self._root, standing)
+        return standing
 
     @property
     def _before_shown(self) -> int:

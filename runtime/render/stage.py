@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import moderngl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -25,10 +27,11 @@ from runtime.render.frame import (
 from runtime.render.framebuffers import Framebuffers
 from runtime.render.inset import InsetPainter, SkeletonInset
 from runtime.render.programs import FRAME_BINDING, link, release_all
-from runtime.render.stage_character import CharacterPrograms, StageCharacter
+from runtime.render.stage_character import CharacterPrograms, GhostLayer, StageCharacter
 from runtime.render.tubes import TubePainter
 
 CLIP_DISTANCE0 = 0x3000
+WASH = 0.65  # how much of a ghost's own colour is replaced
 OVER = (moderngl.ONE, moderngl.ONE_MINUS_SRC_ALPHA)
 UNDER = (moderngl.ONE_MINUS_DST_ALPHA, moderngl.ONE)
 DIM = (moderngl.ZERO, moderngl.SRC_ALPHA)
@@ -37,9 +40,9 @@ DIM = (moderngl.ZERO, moderngl.SRC_ALPHA)
 class Stage:
     """Draws characters into a framebuffer, for a window and for files alike.
 
-    The passes: shadow and contact maps; the characters with multisampling; then backdrop, floor,
-    characters, chains, captions and inset over one another, in sRGB. The backdrop is kept while
-    the camera and the pools of light stay the same.
+    The passes: shadow and contact maps; backdrop and floor; ghosts and then the characters, each
+    with multisampling; chains, captions and inset; all over one another, in sRGB. The backdrop is
+    kept while the camera and the pools of light stay the same.
 
     Args:
         context: an OpenGL 3.3 context, current on this thread.
@@ -65,6 +68,7 @@ class Stage:
         self._samples = min(samples, context.max_samples)
         self._background = background
         self._characters: list[StageCharacter] = []
+        self._doubles: list[StageCharacter] = []
         self._programs = CharacterPrograms(
             depth=link(context, "depth", "depth"),
             plain=link(context, "character", "character"),
@@ -81,6 +85,8 @@ class Stage:
         self._backdrop_array = context.vertex_array(self._backdrop_program, [])
         self._lay_program = link(context, "whole", "resolved")
         self._lay_array = context.vertex_array(self._lay_program, [])
+        self._ghost_program = link(context, "whole", "ghost")
+        self._ghost_array = context.vertex_array(self._ghost_program, [])
         self._fill_program = link(context, "whole", "fill")
         self._fill_array = context.vertex_array(self._fill_program, [])
         self._frame = context.buffer(reserve=FRAME.itemsize, dynamic=True)
@@ -136,6 +142,14 @@ class Stage:
         self._characters.append(added)
         return added
 
+    def double(self, original: StageCharacter) -> StageCharacter:
+        """Return a double of a character on the stage, for ghosts; freed with the stage."""
+        double = StageCharacter(
+            self._context, self._programs, original.character, original.position, ""
+        )
+        self._doubles.append(double)
+        return double
+
     def remove(self, character: StageCharacter) -> None:
         """Remove a character and free its GL objects."""
         self._characters.remove(character)
@@ -153,6 +167,7 @@ class Stage:
         camera: Camera,
         inset: SkeletonInset | None = None,
         around: StageSet | None = None,
+        ghosts: Sequence[GhostLayer] = (),
     ) -> None:
         """Draw the characters as they are now.
 
@@ -160,6 +175,7 @@ class Stage:
             camera: sees them.
             inset: shows the performer.
             around: the curtain; round the pools of light if None.
+            ghosts: are seen behind the characters; the first ones furthest behind.
         """
         light = lighting(self.boxes if self._characters else _EMPTY)
         pools = (
@@ -168,16 +184,25 @@ class Stage:
             else _NO_POOLS
         )
         around = around or stage_set(pools[:, :2])
-        self._seen = covered(camera, self.size, self.boxes)
+        boxes = [each.box for layer in ghosts for each in layer.doubles]
+        self._seen = covered(
+            camera, self.size, np.concatenate([self.boxes, *(b[None] for b in boxes)])
+        )
         self._share(camera, light, pools, around)
         self._context.enable_only(moderngl.DEPTH_TEST)
         self._maps.draw(self._characters, light, contact=self._background is None)
-        self._draw_characters(light)
         if self._background is None:
             self._draw_floor_and_curtain(repr((camera, around)).encode() + pools.tobytes())
         else:
             self._framebuffers.picture.clear()
-        self._lay_over(camera, inset)
+        for layer in ghosts:
+            self._draw_characters(layer.doubles, light)
+            self._ghost_program["wash"] = (*layer.colour, WASH)
+            self._ghost_program["opacity"] = layer.opacity
+            self._lay(self._ghost_array)
+        self._draw_characters(self._characters, light)
+        self._lay(self._lay_array)
+        self._draw_over(camera, inset)
         if self.brightness < 1.0:
             self._fill(DIM, (0.0, 0.0, 0.0, max(self.brightness, 0.0)))
         if self._background is not None and self._background.alpha > 0:
@@ -200,14 +225,15 @@ class Stage:
             buffer.write(block.tobytes())
         self._frame.bind_to_uniform_block(FRAME_BINDING)
 
-    def _draw_characters(self, light: Lighting) -> None:
+    def _draw_characters(self, characters: Sequence[StageCharacter], light: Lighting) -> None:
+        self._context.enable_only(moderngl.DEPTH_TEST)
         for program in (self._programs.plain, self._programs.textured):
             program["shadow_texel"] = 1.8 * light.texel
         self._maps.key.use(0)
         self._framebuffers.characters.use()
         self._framebuffers.characters.clear(viewport=self._seen)
         self._context.enable_direct(CLIP_DISTANCE0)
-        for character in self._characters:
+        for character in characters:
             character.draw()
         self._context.disable_direct(CLIP_DISTANCE0)
         self._framebuffers.resolved.scissor = self._seen
@@ -233,16 +259,20 @@ class Stage:
         self._floor.draw_mask(self._maps)
         self._floor.draw(self._framebuffers.picture, self._framebuffers.reflection_image)
 
-    def _lay_over(self, camera: Camera, inset: SkeletonInset | None) -> None:
+    def _lay(self, array: moderngl.VertexArray) -> None:
+        """Lay what was resolved over the picture, as the program of an array does."""
         picture = self._framebuffers.picture
         picture.use()
         self._context.enable_only(moderngl.BLEND)
         self._context.blend_func = OVER
         self._framebuffers.resolved_image.use(0)
-        width, height = self.size
         picture.scissor = self._seen
-        self._lay_array.render(moderngl.TRIANGLES, vertices=3)
-        picture.scissor = (0, 0, width, height)
+        array.render(moderngl.TRIANGLES, vertices=3)
+        picture.scissor = (0, 0, *self.size)
+
+    def _draw_over(self, camera: Camera, inset: SkeletonInset | None) -> None:
+        """Draw chains, captions and inset over the picture."""
+        height = self.size[1]
         to_clip = camera.projection(self.aspect) @ camera.view
         pixels = height / (2.0 * np.tan(camera.fov / 2.0))
         for character in self._characters:
@@ -251,7 +281,7 @@ class Stage:
             )
         self._draw_captions(to_clip)
         if inset is not None:
-            self._inset.draw(inset, self._tubes, picture)
+            self._inset.draw(inset, self._tubes, self._framebuffers.picture)
 
     def _fill(
         self, blend: tuple[int, int], premultiplied: tuple[float, float, float, float]
@@ -295,6 +325,7 @@ class Stage:
         """Free all GL objects; the stage cannot be used afterwards."""
         for character in list(self._characters):
             self.remove(character)
+        release_all(*self._doubles, self._ghost_array, self._ghost_program)
         release_all(self._framebuffers, self._maps, self._floor, self._tubes, self._inset)
         release_all(self._caption, self._backdrop_array, self._backdrop_program)
         release_all(self._lay_array, self._lay_program, self._fill_array, self._fill_program)

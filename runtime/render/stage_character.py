@@ -53,6 +53,7 @@ class StageCharacter:
     """A character as a stage draws it; `Stage.add` makes one.
 
     Attributes:
+        character: what is drawn.
         caption: the text at its feet; empty for none.
         position: (3,) [m] the place of its origin on the stage.
         spot: (2,) [m] along x and z, how far its pool of light is from there.
@@ -66,7 +67,7 @@ class StageCharacter:
         position: ArrayLike,
         caption: str,
     ) -> None:
-        self.caption = caption
+        self.character, self.caption = character, caption
         self.position = np.array(position, dtype=np.float64).reshape(3)
         self.spot = np.zeros(2)
         self._context = context
@@ -188,6 +189,21 @@ class StageCharacter:
         """Free its GL objects."""
         release_all(*self._arrays.values(), self._moving, self._constant, self._indices)
         release_all(*(run.image for run in self._runs))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GhostLayer:
+    """Doubles that are drawn as one; they hide one another, and cast no shadow.
+
+    Attributes:
+        doubles: made by `Stage.double`.
+        colour: encoded sRGB.
+        opacity: in [0, 1].
+    """
+
+    doubles: Sequence[StageCharacter]
+    colour: tuple[float, float, float]
+    opacity: float
 
 
 @contextmanager

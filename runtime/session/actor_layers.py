@@ -108,6 +108,14 @@ class ActorLayers:
         skinned = self.puppet.bound_skeleton.skinned(played.nodes)
         return Targets(skinned, played.placement, played.nodes)
 
+    def at(self, session: Session, time: float) -> Array | None:
+        """Return the vertices (N, 3) [m] at `time` [s] of a session; None where no clip plays."""
+        if not any(clip.presence(time) > 0.0 for clip, _ in session.played(self.actor)):
+            return None
+        played = self._player.play(session, time)
+        skinned = self.puppet.bound_skeleton.skinned(played.nodes)
+        return self.puppet.stood(skinned, played.placement)
+
     def _follow(self, live: bool, time: float) -> float:
         """How much of the performer counts, eased from frame to frame."""
         passed, self._at = time - self._at, time

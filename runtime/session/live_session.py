@@ -16,6 +16,7 @@ from runtime.session.files import unfinished
 from runtime.session.files.store import SessionStore
 from runtime.session.kiosk import Kiosk
 from runtime.session.live_setups import LiveSetups
+from runtime.session.onion_skin import Ghost, OnionSkin
 from runtime.session.performance import Performance
 from runtime.session.transport import Mode, Transport
 
@@ -76,6 +77,7 @@ class LiveSession:
         self._time = float("nan")
         self._start = 0.0
         self._layers = [self._layered(one) for one in staged]
+        self._onion_skin = OnionSkin(self._layers)
         self._recorded: list[ActorLayers] = []
         self._last: list[int] = []  # the clips of the newest take
 
@@ -288,6 +290,12 @@ class LiveSession:
             else:
                 session = edits.trimmed(session, number, first, last)
         return session
+
+    def ghosts(self) -> Sequence[Ghost]:
+        """Return the characters some moments before and after the one that is paused at."""
+        if self.transport.mode is not Mode.PAUSED:
+            return ()
+        return self._onion_skin.ghosts(self.session, self.transport.position)
 
     # -- Frames ------------------------------------------------------------------------------------
 

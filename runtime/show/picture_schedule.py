@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from runtime.output.output import Output, Screen
-from runtime.show.scene import NOTHING_TAKEN, Scene
+from runtime.show.scene import Scene
 
 EARLY = 0.75  # of the wanted step between pictures; frames never come quite evenly
 
@@ -93,16 +93,14 @@ class PictureSchedule:
             screen.show(picture)
 
     def _read(self, scene: Scene, draw: Callable[[], None]) -> Picture:
-        """Draw what outputs see: neither room for a panel nor what can be clicked.
+        """Draw what outputs see: nothing of what is for the operator alone.
 
         Then draw again for the window.
         """
-        taken, lights = scene.taken, scene.lights
-        scene.taken, scene.lights = NOTHING_TAKEN, None
-        draw()
-        picture = scene.picture()
+        with scene.for_outputs():
+            draw()
+            picture = scene.picture()
         self._taken_at = self._clock()
-        scene.taken, scene.lights = taken, lights
-        if taken != NOTHING_TAKEN or lights is not None:
+        if scene.is_for_operator:
             scene.redraw()
         return picture

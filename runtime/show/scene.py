@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,6 +30,8 @@ from runtime.render.frame import StageSet, stage_set
 from runtime.render.glide import SLACK, Glide, GlideState
 from runtime.render.inset import SkeletonInset, body_bones, inset_circle, inset_side
 from runtime.render.stage import Stage
+from runtime.session.ghost_doubles import GhostDoubles
+from runtime.session.onion_skin import Ghost
 from runtime.show.lights import Lights, pair_colours
 from solvers.skeleton.widest_view import bones_of, shown_length, widest_view
 
@@ -66,6 +69,7 @@ class Scene:
         focus: the number of the puppet whose performer the inset shows.
         performers: the number of each puppet's performer; all follow one at first.
         blackout: 0 for light, 1 for black.
+        ghosts: gives the characters at other moments, as an onion skin; None for none.
         lights: what lights up in place of the drivers' highlights; None for these.
         seen_by: the camera of the newest picture.
         taken: shares of the picture at its left, right, top and bottom that something lies over,
@@ -103,6 +107,8 @@ class Scene:
         self.performers: Sequence[int] = [0] * len(puppets)
         self.camera = self.seen_by = front_camera()
         self.lights: Lights | None = None
+        self.ghosts: Callable[[], Sequence[Ghost]] | None = None
+        self._doubles = GhostDoubles(self.stage, self._characters)
         self.taken = NOTHING_TAKEN
         self._pose: Pose | None = None
         self._close_up: Camera | None = None
@@ -219,10 +225,27 @@ class Scene:
 
     def draw_for_audience(self) -> None:
         """Draw once more what was drawn last: whole, without highlights and without the inset."""
-        kept = self.taken, self.highlights, self.lights, self._inset, self.seen_by
-        self.taken, self.highlights, self.lights, self._inset = NOTHING_TAKEN, False, None, None
-        self.redraw()
-        self.taken, self.highlights, self.lights, self._inset, self.seen_by = kept
+        kept = self.highlights, self._inset, self.seen_by
+        self.highlights, self._inset = False, None
+        with self.for_outputs():
+            self.redraw()
+        self.highlights, self._inset, self.seen_by = kept
+
+    @contextmanager
+    def for_outputs(self) -> Iterator[None]:
+        """Draw without what only the operator sees: the panel's room, ghosts, what is clicked."""
+        kept = self.taken, self.lights, self.ghosts
+        self.taken, self.lights, self.ghosts = NOTHING_TAKEN, None, None
+        try:
+            yield
+        finally:
+            self.taken, self.lights, self.ghosts = kept
+
+    @property
+    def is_for_operator(self) -> bool:
+        """Whether something is drawn that only the operator sees."""
+        special = self.lights is not None or self.ghosts is not None
+        return special or self.taken != NOTHING_TAKEN
 
     def draw(self, pose: Pose | None) -> None:
         """Draw the uploaded puppets with their highlights, and the performer in the inset."""
@@ -253,7 +276,8 @@ class Scene:
         if self.taken != NOTHING_TAKEN:
             camera = camera.clear_of(*self.taken, filled=self._filled)
         self.seen_by = camera
-        self.stage.draw(camera, inset, self._stage_set())
+        ghosts = self.ghosts() if self.ghosts is not None and self._inset is not None else ()
+        self.stage.draw(camera, inset, self._stage_set(), self._doubles.layers(ghosts))
 
     def _light_up(self, number: int, highlights: Sequence[Highlight], colours: Colours) -> None:
         """Light up chains of a puppet: its driver's, unless others are to be seen."""

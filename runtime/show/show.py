@@ -28,7 +28,7 @@ from runtime.show.collector_pauses import collector_paused, objects_frozen
 from runtime.show.interrupts import interrupts_deferred
 from runtime.show.opening.opened_show import OpenedShow
 from runtime.show.pacing import Pace, SpareTime, pace_of
-from runtime.show.scene import NOTHING_TAKEN, Scene
+from runtime.show.scene import Scene
 from runtime.show.settings import ShowSettings
 
 if TYPE_CHECKING:
@@ -205,8 +205,8 @@ class Show:
                 "ShowSettings(pictures=True)"
             )
         self._enter_graphics()
-        self._scene.taken = NOTHING_TAKEN  # the window's panel takes it again
-        self._loop.draw()
+        with self._scene.for_outputs():
+            self._loop.draw()
         return self._scene.picture()
 
     @property
