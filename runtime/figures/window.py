@@ -14,6 +14,7 @@ from replay.builtin import builtin_recording
 from runtime.characters.open_character import load_character
 from runtime.control.actions import press
 from runtime.control.flow_settings import FlowSettings
+from runtime.driving.by_hand.pair_words import read_pair
 from runtime.output.files.whole_file import whole_file
 from runtime.panel.panel import Panel
 from runtime.render.context import headless_context, release_headless
@@ -24,11 +25,14 @@ from runtime.show.settings import MatchSettings, ShowSettings
 from runtime.show.show import Show
 
 QUALITY = 90  # of 100
+PAIRS = tuple(
+    map(read_pair, ("left arm -> tentacle 3", "right arm -> tentacle 7", "head -> mantle"))
+)
 LAYOUTS = 6  # times that the panel is laid out before it is drawn: it finds its size
 
 
 def draw_window(folder: Path, size: tuple[int, int]) -> list[str]:
-    """Write matching.jpg, performing.jpg, session.jpg and hands-free.jpg; return a line for each.
+    """Write a picture of the window for each stage of a show; return a line for each.
 
     Args:
         folder: where they are written; made if it is not there.
@@ -47,6 +51,7 @@ def draw_window(folder: Path, size: tuple[int, int]) -> list[str]:
                 ("performing", _perform),
                 ("session", _layer),
                 ("hands-free", _gesture),
+                ("mapped", _map),
             )
         ]
     finally:
@@ -61,7 +66,7 @@ def _draw(
         store = SessionStore(Path(folder) / "show.bunraku") if stage in (_layer, _gesture) else None
         settings = ShowSettings(
             size=size,
-            match=MatchSettings(rehearse=stage is not _match),
+            match=MatchSettings(rehearse=stage is not _match, pairs=PAIRS if stage is _map else ()),
             flow=FlowSettings(hands_free="raise" if stage is _gesture else ""),
             origin="wave.mcap",
         )
@@ -95,6 +100,11 @@ def _match(show: Show) -> None:
 
 
 def _perform(show: Show) -> None:
+    _tick(show, 45)
+
+
+def _map(show: Show) -> None:
+    """Parts were paired in words."""
     _tick(show, 45)
 
 

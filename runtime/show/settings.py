@@ -11,6 +11,7 @@ from pathlib import Path
 from devices.errors import InputError
 from runtime.conditioning.switches import SWITCHES
 from runtime.control.flow_settings import FlowSettings
+from runtime.driving.by_hand.pair_words import WordedPair
 from runtime.render.background import Background
 
 LEAST_SIDE, MOST_SIDE = 16, 8192  # pixels of a picture's width and height
@@ -69,6 +70,7 @@ class MatchSettings:
             also drives all remaining characters.
         rank: which match is shown first; 1 is the best.
         mapping: a JSON file that pairs joints and nodes by hand, or None to match.
+        pairs: what drives what in words, as "left arm -> tentacle 3"; none to match.
         extend: drive a matched chain on to its longest leaf, or stop at the root of the sub-tree.
         flip: flip the y-axis of the targets, which mirrors the turns.
         driver: how characters follow, a name in `runtime.driving.drivers.DRIVERS`: "absolute"
@@ -90,6 +92,7 @@ class MatchSettings:
     performers: int = 1
     rank: int = 1
     mapping: Path | None = None
+    pairs: tuple[WordedPair, ...] = ()
     extend: bool = True
     flip: bool = False
     driver: str = "auto"

@@ -9,7 +9,6 @@ from typing import Any
 from devices.errors import InputError
 from runtime.cli.options.arguments import (
     colour,
-    count_in,
     counting,
     gain,
     port_number,
@@ -20,6 +19,7 @@ from runtime.cli.options.arguments import (
     size,
     stiffness,
 )
+from runtime.cli.options.flow_options import add_flow_options, flow_settings
 from runtime.cli.options.output_options import (
     add_file_options,
     add_record_option,
@@ -28,7 +28,7 @@ from runtime.cli.options.output_options import (
     sender_settings,
 )
 from runtime.conditioning.switches import STEPS, SWITCHES, for_live, for_recording
-from runtime.control.flow_settings import GESTURES, FlowSettings
+from runtime.driving.by_hand.pair_words import WordedPair, read_pair
 from runtime.render.background import NOTHING, Background
 from runtime.show.settings import (
     DRIVES,
@@ -38,8 +38,6 @@ from runtime.show.settings import (
     RemoteSettings,
     ShowSettings,
 )
-
-HANDS_FREE_COUNT_IN = 3.0  # [s]
 
 
 def add_character_option(group: argparse._ActionsContainer, *, default: str | None = None) -> None:
@@ -65,6 +63,7 @@ def add_show_options(parser: argparse.ArgumentParser) -> None:
     add_picture_options(parser)
     _add_driving(parser)
     _add_match(parser)
+    add_flow_options(parser)
     _add_deformation(parser)
     _add_conditioning(parser)
     add_record_option(add_file_options(parser))
@@ -113,6 +112,7 @@ def show_settings(options: argparse.Namespace, origin: str) -> ShowSettings:
             performers=options.performers,
             rank=options.match,
             mapping=options.mapping,
+            pairs=_pairs(options),
             extend=options.chains == "extend",
             flip=options.flip,
             driver=options.drive,
@@ -126,7 +126,7 @@ def show_settings(options: argparse.Namespace, origin: str) -> ShowSettings:
         files=file_settings(options),
         senders=sender_settings(options),
         remote=_remote(options),
-        flow=_flow(options),
+        flow=flow_settings(options),
         origin=origin,
     )
 
@@ -136,6 +136,7 @@ def _refuse_matching_without_chains(options: argparse.Namespace) -> None:
     asked = {
         "--match": options.match > 1,
         "--mapping": options.mapping is not None,
+        "--map": bool(options.map),
         "--chains stop": options.chains == "stop",
         "--flip": options.flip,
     }
@@ -170,13 +171,10 @@ def _character(options: argparse.Namespace, number: int) -> CharacterSettings:
     )
 
 
-def _flow(options: argparse.Namespace) -> FlowSettings:
-    """Who has no hand free gets time to take their place, unless they say how much."""
-    usual = HANDS_FREE_COUNT_IN if options.hands_free else 0.0
-    return FlowSettings(
-        count_in=usual if options.count_in is None else options.count_in,
-        hands_free=options.hands_free,
-    )
+def _pairs(options: argparse.Namespace) -> tuple[WordedPair, ...]:
+    if options.map and options.mapping is not None:
+        raise InputError("--map and --mapping both say what drives what; leave one of both out")
+    return tuple(map(read_pair, options.map))
 
 
 def _remote(options: argparse.Namespace) -> RemoteSettings | None:
@@ -314,25 +312,19 @@ def _add_match(parser: argparse.ArgumentParser) -> None:
         "pressed (default: 3, or 1 without a window; a recording starts at once)",
     )
     match.add_argument(
-        "--count-in",
-        type=count_in,
-        metavar="S",
-        help="seconds that are counted before a take begins, and before a match that was accepted "
-        "performs (default: 0; 3 with --hands-free)",
-    )
-    match.add_argument(
-        "--hands-free",
-        choices=GESTURES,
-        default="",
-        help="a gesture does the next step: accept the match, begin and end a take, play it; pose: "
-        "arms held out to the sides for 2 s; clap: three claps; raise: a hand held above the head "
-        "(default: none does)",
-    )
-    match.add_argument(
         "--mapping",
         type=Path,
         metavar="FILE.json",
         help="use the pairs of joints and nodes in this file, which docs/mapping.md describes",
+    )
+    match.add_argument(
+        "--map",
+        action="append",
+        default=[],
+        metavar="PAIR",
+        help="let a part of the performer drive a part of a character, in the words of the window: "
+        "'left arm -> tentacle 3', or 'left arm -> squid: tentacle 3' for one of several "
+        "characters; may be repeated (default: match)",
     )
     match.add_argument(
         "--chains",

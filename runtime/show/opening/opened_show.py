@@ -18,8 +18,10 @@ from runtime.control.count_in import CountIn
 from runtime.control.hands_free import HandsFree
 from runtime.control.remote import PORT, Remote
 from runtime.control.show_controls import ShowControls, View
+from runtime.driving.by_hand.parts import character_parts, performer_parts
+from runtime.driving.by_hand.worded import mapping_in_words
 from runtime.driving.drivers import LIMB_BY_LIMB, DriverFactory
-from runtime.driving.mapping import read_mapping
+from runtime.driving.mapping import Mapping, read_mapping
 from runtime.driving.match_session import MatchSession
 from runtime.driving.performer import Performer
 from runtime.driving.rehearsal import rehearse
@@ -232,13 +234,24 @@ class OpenedShow:
                 recorded=self._recording is not None,
                 attended=self.display.window is not None,
             ),
-            [
-                None
-                if match.mapping is None
-                else read_mapping(match.mapping, performer.skeleton, puppet.character.skeleton)
-                for puppet in puppets
-            ],
+            [self._by_hand(performer, puppet) for puppet in puppets],
             make_driver=self._make_driver,
+        )
+
+    def _by_hand(self, performer: Performer, puppet: Puppet) -> Mapping | None:
+        """What the settings let drive a puppet; None for a match."""
+        match, character = self._settings.match, puppet.character
+        if match.mapping is not None:
+            return read_mapping(match.mapping, performer.skeleton, character.skeleton)
+        if not match.pairs:
+            return None
+        bound = puppet.bound_skeleton
+        return mapping_in_words(
+            match.pairs,
+            character.name,
+            performer_parts(performer.skeleton),
+            character_parts(character, bound),
+            bound,
         )
 
     def _rehearse(self, recording: Recording) -> None:

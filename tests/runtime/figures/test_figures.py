@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -151,9 +152,9 @@ def test_the_window_is_drawn_for_the_documents(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["figures", str(tmp_path), "--of", "window", "--size", "320x180"]) == 0
-    names = ("matching", "performing", "session")
+    names = ("matching", "performing", "session", "hands-free", "mapped")
     pictures = [np.asarray(Image.open(tmp_path / f"{name}.jpg").convert("RGB")) for name in names]
     assert all(picture.shape == (180, 320, 3) for picture in pictures)
-    assert (pictures[0] != pictures[1]).any()
-    assert (pictures[1] != pictures[2]).any()
-    assert len(capsys.readouterr().out.splitlines()) == 3
+    for one, another in itertools.pairwise(pictures):
+        assert (one != another).any()
+    assert len(capsys.readouterr().out.splitlines()) == len(names)

@@ -10,9 +10,11 @@ import pytest
 
 from devices.errors import InputError
 from runtime.cli import parser
+from runtime.cli.options.flow_options import flow_settings
 from runtime.cli.options.output_options import file_settings
 from runtime.cli.options.show_options import show_settings
 from runtime.control.flow_settings import FlowSettings
+from runtime.driving.by_hand.pair_words import WordedPair
 from runtime.render.background import NOTHING, Background
 from runtime.show.settings import (
     CharacterSettings,
@@ -89,6 +91,8 @@ def test_every_option_arrives() -> None:
         origin="sim://",
     )
     assert settings_of("--transparent").background == NOTHING
+    pairs = settings_of("--map", "left arm -> tentacle 3", "--map", "head→mantle").match.pairs
+    assert pairs == (WordedPair("left arm", "tentacle 3"), WordedPair("head", "mantle"))
     assert settings_of("--hands-free", "pose").flow == FlowSettings(3.0, "pose")
 
 
@@ -107,6 +111,9 @@ def test_the_demo_has_a_size_and_a_rate_of_its_own() -> None:
         (("--drive", "absolute", "--chains", "stop"), "--chains stop"),
         (("--drive", "absolute", "--mapping", "m.json"), "--mapping"),
         (("--drive", "absolute", "--flip"), "--flip"),
+        (("--drive", "absolute", "--map", "head -> mantle"), "--map"),
+        (("--mapping", "m.json", "--map", "head -> mantle"), "--map and --mapping"),
+        (("--map", "head mantle"), "is no pair: expected one such as"),
     ],
 )
 def test_options_that_contradict_each_other_are_refused_by_their_names(
@@ -125,7 +132,7 @@ def test_no_field_of_the_settings_is_forgotten() -> None:
     }
     source = "".join(
         Path(str(made.__code__.co_filename)).read_text(encoding="utf-8")
-        for made in (show_settings, file_settings)
+        for made in (show_settings, file_settings, flow_settings)
     )
     for kind in (
         ShowSettings, MatchSettings, CharacterSettings, FileSettings, SenderSettings, FlowSettings
