@@ -9,9 +9,9 @@ steps come in this order, because each relies on those before it:
    After this step a performer's memory is their own.
 3. **Exchanged limbs** (`faults`): left and right are put right by the limbs' last places and
    velocities, before either side could be rejected as an outlier.
-4. **Outliers** (`faults`): joints that jump, or whose bones stretch, count as not seen, so that
-   they enter no filter. Steps 3 and 4 believe joints that are exact (`exact_joints`): those of an
-   animation, or of motion capture on a skeleton.
+4. **Outliers** (`guesses`, `faults`): joints that the tracker only guesses, that jump, or whose
+   bones stretch, count as not seen, so that they enter no filter. Steps 3 and 4 believe joints that
+   are exact (`exact_joints`): those of an animation, or of motion capture on a skeleton.
 5. **Filling** (`replay.fill`): unseen joints keep their place, then move to rest. After this step
    no position is NaN. It is the only step without a switch. `rejoining` then moves joints that are
    seen again back without a jump.

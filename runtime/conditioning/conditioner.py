@@ -14,6 +14,7 @@ from runtime.conditioning.body_anatomy import BodyAnatomy, body_anatomy
 from runtime.conditioning.calibration_pose import CalibrationPose, CalibrationPoseState
 from runtime.conditioning.exact_joints import ExactJoints, ExactJointsState
 from runtime.conditioning.faults import Faults, FaultsState
+from runtime.conditioning.guesses import seen_only
 from runtime.conditioning.levelling import Levelling, LevellingState
 from runtime.conditioning.mirror import mirrored
 from runtime.conditioning.rejoining import Rejoining, RejoiningState
@@ -186,6 +187,8 @@ class Conditioner:
         positions, corrected, predicted = frame.positions, self._nothing, self._nothing
         if on.swaps or on.outliers:
             measured = not memory.exact.watch(positions, frame.rotations)
+            if on.outliers:
+                positions = seen_only(positions, frame.confidence)
             swaps, outliers = on.swaps and measured, on.outliers and measured
             mended = memory.faults.mend(positions, frame.time, swaps=swaps, outliers=outliers)
             positions, corrected = mended.positions, mended.corrected
