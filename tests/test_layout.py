@@ -46,6 +46,7 @@ EXTRAS = {
     "pxr",
     "pygel3d",
     "pyvirtualcam",
+    "sounddevice",
     "syphon",
     "websockets",
 }

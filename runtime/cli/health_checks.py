@@ -26,6 +26,7 @@ EXTRAS: dict[str, tuple[str, ...]] = {
     "usd": ("pxr",),
     "leap": ("websockets",),
     "timeline": ("opentimelineio",),
+    "microphone": ("sounddevice",),
     "webcam": ("mediapipe", "cv2"),
     "camera": ("pyvirtualcam",),
     "ndi": ("cyndilib",),

@@ -180,6 +180,8 @@ class LiveSession:
         for layers in self._recorded:
             layers.start()
         self.transport.record()
+        if self.store.microphone is not None:
+            self.store.microphone.begin()
         self._tell(f"recording {self._next_name}")
         return True
 
@@ -200,6 +202,8 @@ class LiveSession:
             return
         takes = [(layers, layers.stop()) for layers in self._recorded]
         made = [(one, each) for one, each in takes if each is not None]
+        if self.store.microphone is not None:
+            self.store.sound = self.store.microphone.end()
         self._add(made, self._start, recording, self._sound() if made else "")
         unfinished.end(self.recordings)
         self.transport.rehearse()

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from devices.stream import SkeletonStream
     from runtime.show.settings import KioskSettings
     from runtime.show.show import Show
+    from runtime.sound.microphone import Microphone
 
 HELP = "record takes in layers, play and edit them"
 USAGE = "SESSION.bunraku [--device URL | --recording FILE] [OPTIONS]"
@@ -54,12 +55,20 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     take.add_argument(
         "--take", action="store_true", help="begin a take as soon as somebody performs"
     )
-    take.add_argument(
+    heard = take.add_mutually_exclusive_group()
+    heard.add_argument(
         "--sound",
         action=Once,
         type=Path,
         metavar="FILE",
         help="takes carry this sound from their first frame on; videos of the session have it",
+    )
+    heard.add_argument(
+        "--microphone",
+        action=Once,
+        metavar="NAME",
+        help="takes carry what this microphone hears: default, its number or a part of its name "
+        "(extra: microphone)",
     )
     take.add_argument(
         "--at",
@@ -99,6 +108,7 @@ def run(options: argparse.Namespace) -> int:
     store = SessionStore(options.session)
     store.sound = sound
     try:
+        store.microphone = _microphone(options)
         options.character = store.adopt(options.character or [])
         if store.session.actors and options.drive == "auto":
             options.drive = store.session.actors[0].drive
@@ -117,6 +127,9 @@ def run(options: argparse.Namespace) -> int:
     except BaseException:
         store.abandon()
         raise
+    finally:
+        if store.microphone is not None:
+            store.microphone.close()
     session = store.session
     messages.announce(
         f"{store.path}: {counting(len(session.takes), 'take')}, "
@@ -124,6 +137,15 @@ def run(options: argparse.Namespace) -> int:
         f"{session.duration:.2f} s"
     )
     return code
+
+
+def _microphone(options: argparse.Namespace) -> Microphone | None:
+    """The microphone whose sound takes carry."""
+    if options.microphone is None:
+        return None
+    from runtime.sound.microphone import Microphone, SystemMicrophone
+
+    return Microphone(SystemMicrophone(options.microphone))
 
 
 def _kiosk(options: argparse.Namespace) -> KioskSettings | None:

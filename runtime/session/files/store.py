@@ -24,6 +24,7 @@ from runtime.session.files.folder import (
 from runtime.session.files.unfinished import rescue
 from runtime.session.performance import Performance
 from runtime.session.versions import Versions
+from runtime.sound.microphone import Microphone
 from runtime.sound.sound import Sound
 
 UNSAVED = ".unsaved"
@@ -43,6 +44,7 @@ class SessionStore:
         characters: for each actor of a new session its character: a built-in one, or a file in the
             session; empty where nobody has said.
         sound: that the takes to come carry; None for none.
+        microphone: whose sound each take carries in its place; None for none.
 
     Raises:
         InputError: it cannot be read or written, is of a newer version, or is open elsewhere.
@@ -56,6 +58,7 @@ class SessionStore:
         self.notes: list[str] = []
         self.characters: list[str] = []
         self.sound: Sound | None = None
+        self.microphone: Microphone | None = None
         recovered = (beside / DOCUMENT).is_file()
         self.folder = SessionFolder(beside)
         session = Session()
