@@ -75,12 +75,17 @@ class Motion:
 
         Between frames each knot takes the shorter way, at a constant rate.
         """
+        first, second, share = self.between(time)
+        return first if share == 0.0 else slerped(first, second, share)
+
+    def between(self, time: float) -> tuple[Array, Array, float]:
+        """Return the frames (P, 4) before and after a `time` [s], and the share between them."""
         after = int(np.searchsorted(self.times, time, side="right"))
         if after == 0 or after == len(self.times):
-            held: Array = self.turns[max(after - 1, 0)]
-            return held
+            held = self.turns[max(after - 1, 0)]
+            return held, held, 0.0
         share = (time - self.times[after - 1]) / (self.times[after] - self.times[after - 1])
-        return slerped(self.turns[after - 1], self.turns[after], float(share))
+        return self.turns[after - 1], self.turns[after], float(share)
 
 
 def motion_of_bones(times: ArrayLike, lengths: ArrayLike, turns: ArrayLike) -> Motion:
@@ -159,8 +164,8 @@ class Clip:
         return multiply(multiply(change, turns), change * np.array([-1.0, -1.0, -1.0, 1.0]))
 
 
-def slerped(first: Array, second: Array, share: float) -> Array:
-    """Return quaternions (..., 4) a share of the shorter way from `first` to `second`."""
+def slerped(first: Array, second: Array, share: float | Array) -> Array:
+    """Return quaternions (..., 4) a share (..., 1) of the shorter way from `first` to `second`."""
     cosine = (first * second).sum(axis=-1, keepdims=True)
     target = np.where(cosine < 0.0, -second, second)
     sine = np.linalg.norm(target - np.abs(cosine) * first, axis=-1, keepdims=True)

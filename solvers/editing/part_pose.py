@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from solvers.editing.motion import Clip
+from solvers.editing.motion import Clip, slerped
 from solvers.editing.part import Part
 from solvers.kernels.compiled import kernel
 from solvers.kernels.quaternion import (
@@ -21,6 +21,7 @@ from solvers.kernels.quaternion import (
     quaternion,
     rotate,
 )
+from solvers.skeleton.quaternions import multiply as multiplied
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
@@ -69,24 +70,41 @@ class PartPlayer:
         self._of_bone = _starts([len(node.bone.turns) for node in part.nodes])
         self._of_turn = _starts([len(turn.layers) for turn in turns])
         clips: dict[Clip, int] = {}
-        numbers = [clips.setdefault(layer.clip, len(clips)) for layer in layers]
+        # Neighbouring bones meet at one place of a clip: each place is sampled once.
+        places: dict[tuple[int, float], int] = {}
+        ways: dict[tuple[int, int], int] = {}
+        rows = []
+        for layer in layers:
+            number = clips.setdefault(layer.clip, len(clips))
+            entry, first, last = (
+                places.setdefault((number, s), len(places))
+                for s in (layer.entry, layer.first, layer.last)
+            )
+            from_entry = [ways.setdefault((entry, each), len(ways)) for each in (first, last)]
+            rows.append((first, last, *from_entry))
         self._clips = tuple(clips)
-        self._numbers = np.array(numbers, dtype=np.int64)
-        spans = [(layer.entry, layer.first, layer.last) for layer in layers]
-        self._spans = np.array(spans, dtype=np.float64).reshape(-1, 3)
-        self._weights = np.array([clip.weight for clip in self._clips], dtype=np.float64)
-        self._of_clip = _starts([len(clip.motion.knots) for clip in self._clips])
-        knots = [clip.motion.knots for clip in self._clips]
-        self._knots = np.concatenate(knots) if knots else np.empty(0)
+        self._layers = np.array(rows, dtype=np.int64).reshape(-1, 4)
+        self._weights = np.array([layer.clip.weight for layer in layers], dtype=np.float64)
+        self._ways = np.array(list(ways), dtype=np.int64).reshape(-1, 2)
+        self._counts = [len(clip.motion.knots) for clip in self._clips]
+        self._at, self._share = _places(list(places), [clip.motion.knots for clip in self._clips])
+        changes = np.array([clip.change for clip in self._clips]).reshape(-1, 4)
+        self._changes = np.repeat(changes, self._counts, axis=0)
 
     def at(self, time: float) -> PartPose:
         """Return the pose at a `time` [s]."""
-        turns = [clip.at(time) for clip in self._clips]
-        return self._posed(np.concatenate(turns) if turns else np.empty((0, 4)))
+        if not self._clips:
+            return self.modelled()
+        around = [clip.motion.between(clip.moment(time)) for clip in self._clips]
+        first, second = (np.concatenate([frames[k] for frames in around]) for k in (0, 1))
+        shares = np.repeat(np.array([share for _, _, share in around]), self._counts)
+        turns = slerped(first, second, shares[:, None])
+        back = self._changes * np.array([-1.0, -1.0, -1.0, 1.0])
+        return self._posed(multiplied(multiplied(self._changes, turns), back))
 
     def modelled(self) -> PartPose:
         """Return the pose that modelling made, without any motion."""
-        return self._posed(np.tile([0.0, 0.0, 0.0, 1.0], (len(self._knots), 1)))
+        return self._posed(np.tile([0.0, 0.0, 0.0, 1.0], (sum(self._counts), 1)))
 
     def _posed(self, turns: Array) -> PartPose:
         positions, rotations = np.empty_like(self._vectors), np.empty((len(self._vectors), 4))
@@ -97,11 +115,11 @@ class PartPlayer:
             self._of_bone,
             self._models,
             self._of_turn,
-            self._numbers,
-            self._spans,
+            self._layers,
             self._weights,
-            self._of_clip,
-            self._knots,
+            self._ways,
+            self._at,
+            self._share,
             turns,
             positions,
             rotations,
@@ -124,13 +142,23 @@ def _starts(counts: list[int]) -> Indices:
     return np.concatenate([[0], np.cumsum(counts)]).astype(np.int64)
 
 
+def _places(places: list[tuple[int, float]], knots: list[Array]) -> tuple[Indices, Array]:
+    """The knot (S,) of all clips' before each place, and how far it is to the next one (S,)."""
+    starts = _starts([len(each) for each in knots])
+    at, share = np.zeros(len(places), np.int64), np.zeros(len(places))
+    numbers = np.array([number for number, _ in places], dtype=np.int64)
+    values = np.array([s for _, s in places])
+    for number, own in enumerate(knots):
+        mine = numbers == number
+        before = np.clip(np.searchsorted(own, values[mine], side="right") - 1, 0, len(own) - 2)
+        at[mine] = starts[number] + before
+        share[mine] = (values[mine] - own[before]) / (own[before + 1] - own[before])
+    return at, share
+
+
 @kernel
-def _sample(knots: Array, turns: Array, begin: int, stop: int, s: float) -> Quaternion:
-    """q at s; exactly a knot's where s is one."""
-    at = begin
-    while at + 2 < stop and knots[at + 1] <= s:
-        at += 1
-    share = (s - knots[at]) / (knots[at + 1] - knots[at])
+def _sample(turns: Array, at: int, share: float) -> Quaternion:
+    """q between two knots; exactly a knot's where it is one."""
     first = quaternion(turns, at)
     if share <= 0.0:
         return first
@@ -159,55 +187,33 @@ def _exponential(x: float, y: float, z: float) -> Quaternion:
 
 @kernel
 def _stacked(
-    first: int,
-    last: int,
-    column: int,
-    numbers: Indices,
-    spans: Array,
-    weights: Array,
-    of_clip: Indices,
-    knots: Array,
-    turns: Array,
+    begin: int, stop: int, column: int, layers: Indices, weights: Array, logs: Array
 ) -> Quaternion:
-    """Q where the layers begin (column 1) or end (column 2): logarithms since entry, added up."""
+    """Q where the layers begin (column 2) or end (column 3): logarithms since entry, added up."""
     x = y = z = 0.0
-    for row in range(first, last):
-        clip = numbers[row]
-        begin, stop = of_clip[clip], of_clip[clip + 1]
-        entry = _sample(knots, turns, begin, stop, spans[row, 0])
-        here = _sample(knots, turns, begin, stop, spans[row, column])
-        log = _logarithm(multiply(conjugate(entry), here))
-        x += weights[clip] * log[0]
-        y += weights[clip] * log[1]
-        z += weights[clip] * log[2]
+    for row in range(begin, stop):
+        way = layers[row, column]
+        x += weights[row] * logs[way, 0]
+        y += weights[row] * logs[way, 1]
+        z += weights[row] * logs[way, 2]
     return _exponential(x, y, z)
 
 
 @kernel
 def _animated(
-    first: int,
-    last: int,
-    numbers: Indices,
-    spans: Array,
-    weights: Array,
-    of_clip: Indices,
-    knots: Array,
-    turns: Array,
+    begin: int, stop: int, layers: Indices, weights: Array, samples: Array, logs: Array
 ) -> Quaternion:
-    """A of the layers from `first` to before `last`."""
+    """A of the layers from `begin` to before `stop`."""
     moving = False
-    for row in range(first, last):
-        moving = moving or spans[row, 1] != spans[row, 2]
+    for row in range(begin, stop):
+        moving = moving or layers[row, 0] != layers[row, 1]
     if not moving:
         return (0.0, 0.0, 0.0, 1.0)
-    if last == first + 1 and weights[numbers[first]] == 1.0:
-        clip = numbers[first]
-        begin, stop = of_clip[clip], of_clip[clip + 1]
-        start = _sample(knots, turns, begin, stop, spans[first, 1])
-        return multiply(conjugate(start), _sample(knots, turns, begin, stop, spans[first, 2]))
-    start = _stacked(first, last, 1, numbers, spans, weights, of_clip, knots, turns)
-    end = _stacked(first, last, 2, numbers, spans, weights, of_clip, knots, turns)
-    return multiply(conjugate(start), end)
+    if stop == begin + 1 and weights[begin] == 1.0:
+        start = quaternion(samples, layers[begin, 0])
+        return multiply(conjugate(start), quaternion(samples, layers[begin, 1]))
+    start = _stacked(begin, stop, 2, layers, weights, logs)
+    return multiply(conjugate(start), _stacked(begin, stop, 3, layers, weights, logs))
 
 
 @kernel
@@ -218,22 +224,30 @@ def _pose(
     of_bone: Indices,
     models: Array,
     of_turn: Indices,
-    numbers: Indices,
-    spans: Array,
+    layers: Indices,
     weights: Array,
-    of_clip: Indices,
-    knots: Array,
+    ways: Indices,
+    at: Indices,
+    share: Array,
     turns: Array,
     positions: Array,
     rotations: Array,
 ) -> None:
+    samples = np.empty((len(at), 4))
+    for s in range(len(at)):
+        q = _sample(turns, at[s], share[s])
+        samples[s, 0], samples[s, 1], samples[s, 2], samples[s, 3] = q
+    logs = np.empty((len(ways), 3))
+    for way in range(len(ways)):
+        entry = conjugate(quaternion(samples, ways[way, 0]))
+        log = _logarithm(multiply(entry, quaternion(samples, ways[way, 1])))
+        logs[way, 0], logs[way, 1], logs[way, 2] = log
     for node in range(len(parents)):
         parent = parents[node]
         here = (0.0, 0.0, 0.0, 1.0) if parent < 0 else quaternion(rotations, parent)
         for turn in range(of_bone[node], of_bone[node + 1]):
-            moved = _animated(
-                of_turn[turn], of_turn[turn + 1], numbers, spans, weights, of_clip, knots, turns
-            )
+            begin, stop = of_turn[turn], of_turn[turn + 1]
+            moved = _animated(begin, stop, layers, weights, samples, logs)
             here = normalized(multiply(multiply(here, quaternion(models, turn)), moved))
         rotations[node, 0], rotations[node, 1], rotations[node, 2], rotations[node, 3] = here
         bone = rotate(here, (vectors[node, 0], vectors[node, 1], vectors[node, 2]))
