@@ -22,8 +22,9 @@ def part_radii(
     """Return the radius (K,) [m] of the part to which the bone that ends at each node belongs.
 
     An arm is as thick as its outer half, for its beginning may lie inside the trunk; both arms are
-    alike. A leg counts as thick as the trunk at least, for the trunk ends there: a thick one would
-    take the feet of short legs. What belongs to no part, such as an ear, has its own radius.
+    alike. A leg that is thinner than the trunk counts as half way between them (as a factor), for
+    the trunk ends there: a thick one would take the feet of short legs, and legs as thick as it
+    the belly of a toy that sits. What belongs to no part, such as an ear, has its own radius.
 
     Args:
         vertices: (N, 3) [m] surface at rest.
@@ -52,7 +53,8 @@ def part_radii(
         measure(limbs, [limb[len(limb) // 2 + 1 :] for limb in limbs])
         if pair is not plan.arms:
             for limb in limbs:
-                radii[list(limb)] = np.maximum(radii[list(limb)], trunk)
+                own = radii[list(limb)]
+                radii[list(limb)] = np.maximum(own, np.sqrt(trunk * own))
     for node in tree.order:
         if not known[node] and tree.parents[node] >= 0:
             branch = tuple(each for each in tree.subtree(node) if not known[each])
