@@ -1,4 +1,4 @@
-"""Steadies hands and feet whose directions flip, as depth cameras show them.
+"""Steadies hands, feet and heads that flip, as depth cameras' do, and lets all others be.
 
 A hand is a short bone: noise of a few centimetres turns it by 70 degrees from one frame to the
 next. What turns slowly enough for a hand passes unchanged. What turns faster is followed within a

@@ -57,7 +57,7 @@ class BodyState:
         nodes: the posed nodes.
         rest_turn: what the performer's rotations mean.
         footing: of the feet.
-        ends: of hands and feet.
+        ends: of hands, feet and head.
     """
 
     rest: Rest | None
@@ -368,9 +368,11 @@ def _hips_that_lead(bodies: TwoBodies) -> list[int]:
 
 
 def _ends(bodies: TwoBodies) -> SteadyEnds:
-    """The performer's hands and feet."""
-    limbs = [*bodies.source.arms.values(), *bodies.source.legs.values()]
-    ends = [limb.end for limb in limbs if len(limb.end) > 1]
+    """The performer's hands, feet and head."""
+    source = bodies.source
+    limbs = [*source.arms.values(), *source.legs.values()]
+    chains = [*(limb.end for limb in limbs), (*source.trunk[-1:], *source.head[1:])]
+    ends = [chain for chain in chains if len(chain) > 1]
     return SteadyEnds([end[0] for end in ends], [end[-1] for end in ends])
 
 
