@@ -3,9 +3,10 @@
 A foreleg that pointed as an arm points would hover above the floor, or lift the chest, as soon as
 the arm is not where the foreleg is at rest. So while the arm hangs, the foreleg stands as it does
 at rest: its foot is flat, at its own height, below the shoulder. It steps as the performer's other
-foot does, so that it stays where that stays: the trot of a body on four legs. Of a performer on
-four legs it follows the foreleg of its own side. The higher the performer lifts the hand, the more
-the foreleg points as the arm does.
+foot does, so that it stays where that stays: the trot of a body on four legs. A foot in the air
+hangs. Of a performer on four legs it follows the foreleg of its own side. The higher the performer
+lifts the hand, the more the foreleg points as the arm does, as far as a foreleg can. The chest of
+who bows stays so high that the forelegs have room.
 """
 
 from __future__ import annotations
@@ -19,13 +20,14 @@ from numpy.typing import NDArray
 
 from devices.bodies.body_plan import SIDES, BodyPlan, Limb
 from runtime.driving.body.body_parts import Arm, TwoBodies
-from runtime.driving.body.performer_steps import LIFTED, performer_steps
+from runtime.driving.body.foreleg_limits import ForelegLimits
+from runtime.driving.body.performer_steps import performer_steps
 from runtime.driving.body.rig_builder import LOW
 from runtime.driving.body.soles import Soles
 from runtime.driving.root_motion import chain_length
 from solvers.kernels.compiled import kernel
 from solvers.kernels.quaternion import Quaternion, Vector, multiply, quaternion, rotate
-from solvers.kernels.vector import minus, plus, point
+from solvers.kernels.vector import minus, plus, point, scaled
 from solvers.retarget.two_bone_ik import bend
 from solvers.surface.skin_weights import Skin
 
@@ -35,6 +37,13 @@ Ints = NDArray[np.int64]
 _LEVEL = 1.0  # of its length along the floor: a trunk that rises by more is upright
 _REACH = 0.995  # of its length: a foreleg stands no farther from its shoulder
 _SINKS = math.radians(10.0)  # by which the trunk sinks at most for forelegs that do not reach
+_LIFTED = (0.4, 0.9)
+"""Of an arm's length: a hand this far up leads a foreleg not at all, and fully. Arms that swing in
+a walk lift the hands less."""
+_DEEPEST = 0.5  # of a foreleg's length: a chest that sinks more from rest would crush it
+_RISES = math.radians(75.0)  # by which the trunk rises at most for that
+_HANGS, _HIGH = math.radians(65.0), 0.12  # a foot this far up, of the foreleg's length, hangs so
+_STRAIGHT = math.sin(math.radians(4.5))  # a foreleg that bends by less bends as a knee does
 _OFF = 0.03  # of a leg: a foot of the performer that is lower stands
 _TURNED = 1e-9  # a rotation of less is none about the vertical
 _NOTHING = 1e-9  # [m]
@@ -48,16 +57,21 @@ class _Legs(NamedTuple):
         shoulders: (F,) the nodes at which they begin.
         carriers: (F,) the nodes above these.
         upper, lower: (F, 3) [m] from the shoulders to the elbows and to the wrists.
-        heights: (F,) [m] of the wrists above the floor.
+        stands, heights: (F,) [m] of the shoulders and the wrists above the floor.
         axes: (F, 3) about which straight ones bend.
+        lengths: (F,) [m]
+        left: (3,) the body's left.
     """
 
     shoulders: Ints
     carriers: Ints
     upper: Array
     lower: Array
+    stands: Array
     heights: Array
     axes: Array
+    lengths: Array
+    left: Array
 
 
 class Forelegs:
@@ -87,22 +101,27 @@ class Forelegs:
         joints = [(arm.starts[0], arm.starts[1], arm.wrist) for arm in arms]
         places = rest[np.array(joints, dtype=np.int64).reshape(-1, 3)]
         self._root = rest[tree.root]
-        self._long = np.array([chain_length(rest, chain) for chain in joints])
         hind = [(leg.lower or leg.upper)[-1] for leg in bodies.plan.legs.values() if arms]
         self._soles = Soles(tree, [*(arm.wrist for arm in arms), *hind], *surface)
         self._floor, self._pointing = 0.0, [np.zeros((len(arm.starts), 4)) for arm in arms]
         left = np.array([np.cos(bodies.facing), 0.0, -np.sin(bodies.facing)])
         self._left = left
         upper, lower = places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]
-        bends = np.cross(upper, lower) @ left
+        bends = np.cross(upper, lower - upper) @ left
+        sizes = np.linalg.norm(upper, axis=1) * np.linalg.norm(lower - upper, axis=1)
+        like_elbow = float((bends / np.maximum(sizes, _NOTHING)).sum()) < -_STRAIGHT * len(arms)
         self._legs = _Legs(
             shoulders=np.array([arm.starts[0] for arm in arms], dtype=np.int64),
             carriers=np.array([tree.parents[arm.starts[0]] for arm in arms], dtype=np.int64),
             upper=upper,
             lower=lower,
+            stands=places[:, 0, 1] - rest[:, 1].min(),
             heights=places[:, 2, 1] - rest[:, 1].min(),
-            axes=np.where(bends[:, None] > 0.0, left, -left),
+            axes=np.tile(-left if like_elbow else left, (len(arms), 1)),
+            lengths=np.array([chain_length(rest, chain) for chain in joints]),
+            left=left,
         )
+        self._limits = ForelegLimits(tree, arms, bodies.facing)
         self._own = np.array([SIDES.index(arm.side) for arm in arms], dtype=np.int64)
         self._performer = performer_steps(bodies)
         self._ratio = ratio
@@ -116,19 +135,19 @@ class Forelegs:
     def _load(self, rest: Array) -> None:
         """Use the kernels once at rest, so that no frame waits for them."""
         still = np.tile([0.0, 0.0, 0.0, 1.0], (len(rest), 1))
-        out = np.empty((len(self._long), _SEGMENTS, 4))
+        out = np.empty((len(self._segments), _SEGMENTS, 4))
         legs, moves = self._legs, self._moves
-        _plant_all(legs, moves, 0.0, rest, still, out)
-        _sinks(legs, moves, 0.0, self._shares, self._long, self._root, rest, still)
+        _plant_all(legs, moves, moves[:, 1], 0.0, rest, still, out)
+        _sinks(legs, moves, 0.0, self._shares, self._root, rest, still)
 
     def follow(self, joints: Array, heights: Array) -> bool:
-        """Take in a frame; return whether any foreleg stands.
+        """Take in a frame; return whether there are forelegs.
 
         Args:
             joints: (J, 3) [m] the performer, turned as the character faces.
             heights: (F,) [m] of the performer's feet above the floor.
         """
-        if not len(self._long):
+        if not len(self._segments):
             return False
         if self._standing is not None:
             moves = self._hooves(joints) - self._standing
@@ -137,27 +156,31 @@ class Forelegs:
         else:
             lifted = np.array([self._performer.of_hand(side, joints)[1] for side in self._own])
             self._moves = self._steps(joints, heights)
-        share = np.clip((lifted - LIFTED[0]) / (LIFTED[1] - LIFTED[0]), 0.0, 1.0)
+        share = np.clip((lifted - _LIFTED[0]) / (_LIFTED[1] - _LIFTED[0]), 0.0, 1.0)
         self._shares = share * share * (3.0 - 2.0 * share)
         self._moves[:, 1] = np.maximum(self._moves[:, 1], 0.0)
-        return bool((self._shares < 1.0).any())
+        return True
 
     def sinks(self, positions: Array, rotations: Array) -> float:
         """Return the angle [rad] by which the trunk sinks until forelegs that stand reach down.
+
+        It is negative where the trunk has to rise so that forelegs have room.
 
         Args:
             positions: (K, 3) [m] of the nodes; the forelegs point as the arms do.
             rotations: (K, 4) of the nodes.
         """
-        count = len(self._long)
-        self._pointing = [rotations[starts] for starts in self._starts]
+        count = len(self._segments)
+        self._pointing = [
+            self._limits.held(leg, rotations[self._legs.carriers[leg]], rotations[starts])
+            for leg, starts in enumerate(self._starts)
+        ]
         self._floor = float(self._soles.heights(positions, rotations)[count:].min())
         return _sinks(
             self._legs,
             self._moves,
             self._floor,
             self._shares,
-            self._long,
             self._root,
             positions,
             rotations,
@@ -180,7 +203,7 @@ class Forelegs:
             positions, rotations: of the nodes, as `plant` has them.
             given: (S, 4) is changed.
         """
-        count = len(self._long)
+        count = len(self._segments)
         lows = self._soles.heights(positions, rotations)
         self._floor = float(lows[count:].min())
         moves = self._moves.copy()
@@ -192,8 +215,9 @@ class Forelegs:
 
     def _plant(self, positions: Array, rotations: Array, moves: Array, given: Array) -> None:
         """Let all forelegs stand, their feet moved by (F, 3) [m] from below their shoulders."""
-        stood = np.empty((len(self._long), _SEGMENTS, 4))
-        _plant_all(self._legs, moves, self._floor, positions, rotations, stood)
+        stood = np.empty((len(self._segments), _SEGMENTS, 4))
+        lifts = self._moves[:, 1]
+        _plant_all(self._legs, moves, lifts, self._floor, positions, rotations, stood)
         for leg, segments in enumerate(self._segments):
             given[segments] = stood[leg, : len(segments)]
 
@@ -260,11 +284,22 @@ def _goal(
 
 @kernel
 def _plant_all(
-    legs: _Legs, moves: Array, floor: float, positions: Array, rotations: Array, out: Array
+    legs: _Legs,
+    moves: Array,
+    lifts: Array,
+    floor: float,
+    positions: Array,
+    rotations: Array,
+    out: Array,
 ) -> None:
-    """Write the rotations (F, 3, 4) of upper and lower segments and feet that stand."""
+    """Write the rotations (F, 3, 4) of upper and lower segments and feet that stand or hang."""
+    left = (legs.left[0], legs.left[1], legs.left[2])
     for leg in range(len(legs.shoulders)):
         goal, level = _goal(legs, leg, moves, floor, positions, rotations)
+        high = min(max(lifts[leg] / max(_HIGH * legs.lengths[leg], _NOTHING), 0.0), 1.0)
+        half = 0.5 * _HANGS * high * high * (3.0 - 2.0 * high)
+        x, y, z = scaled(left, math.sin(half))
+        foot = multiply(level, (x, y, z, math.cos(half)))
         carry = quaternion(rotations, legs.carriers[leg])
         shoulder = point(positions, legs.shoulders[leg])
         elbow = plus(shoulder, rotate(carry, point(legs.upper, leg)))
@@ -274,7 +309,7 @@ def _plant_all(
         upper, lower = multiply(upper, carry), multiply(lower, carry)
         out[leg, 0, 0], out[leg, 0, 1], out[leg, 0, 2], out[leg, 0, 3] = upper
         out[leg, 1, 0], out[leg, 1, 1], out[leg, 1, 2], out[leg, 1, 3] = lower
-        out[leg, 2, 0], out[leg, 2, 1], out[leg, 2, 2], out[leg, 2, 3] = level
+        out[leg, 2, 0], out[leg, 2, 1], out[leg, 2, 2], out[leg, 2, 3] = foot
 
 
 @kernel
@@ -283,22 +318,36 @@ def _sinks(
     moves: Array,
     floor: float,
     shares: Array,
-    lengths: Array,
     root: Array,
     positions: Array,
     rotations: Array,
 ) -> float:
     """The angle [rad] by which the trunk sinks: see `Forelegs.sinks`."""
-    sine = 0.0
+    sine, rises, free = 0.0, 0.0, _RISES
     for leg in range(len(legs.shoulders)):
         goal, _ = _goal(legs, leg, moves, floor, positions, rotations)
         shoulder = point(positions, legs.shoulders[leg])
         x, y, z = minus(goal, shoulder)
-        reach = math.sqrt(max((_REACH * lengths[leg]) ** 2 - x * x - z * z, 0.0))
+        long = legs.lengths[leg]
+        reach = math.sqrt(max((_REACH * long) ** 2 - x * x - z * z, 0.0))
         lever = math.hypot(shoulder[0] - root[0], shoulder[2] - root[2])
         lacks = (1.0 - shares[leg]) * max(-y - reach, 0.0)
         sine = max(sine, lacks / max(lever, _NOTHING))
-    return min(math.asin(min(sine, 1.0)), _SINKS)
+        above = shoulder[1] - root[1]
+        trunk = max(math.hypot(lever, above), _NOTHING)
+        slack = max(reach + y, 0.0) + shares[leg] * long
+        free = min(free, _rise(above, slack, trunk))
+        sunk = max(legs.stands[leg] + floor - shoulder[1], 0.0)
+        deep = _DEEPEST * long
+        crush = sunk - deep * math.tanh(sunk / deep)
+        rises = max(rises, _rise(above, crush, trunk))
+    return min(math.asin(min(sine, 1.0)), _SINKS) - min(rises, free)
+
+
+@kernel
+def _rise(above: float, by: float, long: float) -> float:
+    """The angle [rad] by which a trunk turns until its end is `by` higher than `above` its root."""
+    return math.asin(max(min((above + by) / long, 1.0), -1.0)) - math.asin(above / long)
 
 
 def _between(first: Array, second: Array, share: float) -> Array:

@@ -42,6 +42,8 @@ class Played:
     Attributes:
         lows: (frames, 2, 2) [m] of each limb, forelegs and hind legs, left and right.
         feet: (frames, 2, 2, 3) [m] where they end, seen from the hips.
+        ways: (frames, 2, 2, 3) unit, from wrists and ankles to these.
+        chest: (frames,) [m] the height of the end of the trunk over that of the hips.
     """
 
     def __init__(self, character: Character, *poses: Array, performer: Skeleton = BODY) -> None:
@@ -55,7 +57,7 @@ class Played:
         limbs = [[pair[side] for side in SIDES] for pair in (plan.arms, plan.legs)]
         owner = skin.skin.nodes[:, 0]
         own = [[np.isin(owner, tree.subtree(limb.chain[0])) for limb in pair] for pair in limbs]
-        lows, feet = [], []
+        lows, feet, ways, chest = [], [], [], []
         for number, positions in enumerate(poses):
             seen = follower.follow(frame(positions, number / 30.0))
             if start is None:
@@ -68,7 +70,11 @@ class Played:
             nodes = motion.nodes.positions
             lows.append([[motion.vertices[each, 1].min() for each in pair] for pair in own])
             feet.append([[nodes[limb.chain[-1]] - nodes[plan.hips] for limb in p] for p in limbs])
+            ends = [[nodes[limb.chain[-1]] - nodes[limb.lower[-1]] for limb in p] for p in limbs]
+            ways.append(ends / np.linalg.norm(ends, axis=2, keepdims=True))
+            chest.append(nodes[plan.trunk[-1], 1] - nodes[plan.hips, 1])
         self.lows, self.feet = np.array(lows), np.array(feet)
+        self.ways, self.chest = np.array(ways), np.array(chest)
 
 
 def arms(forward: float, bend: float) -> Array:
@@ -102,7 +108,7 @@ def test_the_forelegs_step_with_the_other_foot(dog) -> None:
     assert hind_left > 0.1
     assert hind_right < -0.1
     assert fore_left == pytest.approx(hind_right, abs=0.05)
-    assert fore_right == pytest.approx(hind_left, abs=0.05)
+    assert fore_right == pytest.approx(hind_left, abs=0.1)  # it is in the air, and hangs
 
 
 def test_a_lifted_arm_lifts_its_own_foreleg_alone(dog) -> None:
@@ -112,6 +118,37 @@ def test_a_lifted_arm_lifts_its_own_foreleg_alone(dog) -> None:
     assert left > 0.2 * height
     assert right < 0.01 * height
     assert hind.max() < 0.01 * height
+
+
+def test_arms_that_swing_with_bent_elbows_lift_no_foreleg(dog) -> None:
+    shown = Played(dog, pose(HANGING), *[arms(0.5, 0.9)] * 2)
+    assert np.abs(shown.lows[-1]).max() < 0.01 * np.ptp(dog.vertices[:, 1])
+
+
+def test_a_forefoot_in_the_air_hangs(dog) -> None:
+    lifted = {"HipRight": (-1.0, 0.0, 0.0), "KneeRight": (1.0, 0.0, 0.0)}
+    shown = Played(dog, pose(HANGING), pose({**HANGING, **lifted}))
+    (left, right), _ = shown.lows[1]
+    assert left > 0.05 * np.ptp(dog.vertices[:, 1]) > 10.0 * abs(right)
+    turned = shown.ways[1, 0] - shown.ways[0, 0]
+    assert turned[0, 2] < -0.5
+    assert np.abs(turned[1]).max() < 0.1
+
+
+def test_an_arm_that_points_up_lifts_a_foreleg_to_the_front(dog) -> None:
+    shown = Played(dog, pose(HANGING), pose({**HANGING, "ShoulderLeft": (0.0, 0.0, 1.5)}))
+    before, after = shown.feet[:, 0, 0]
+    reach = after - before
+    assert reach[2] > 0.15  # ahead, and no higher than the back
+    assert after[1] < 0.2
+
+
+def test_who_bows_deeply_leaves_the_forelegs_room(dog) -> None:
+    bow = {"SpineBase": (1.2, 0.0, 0.0), "HipLeft": (-1.2, 0.0, 0.0), "HipRight": (-1.2, 0.0, 0.0)}
+    shown = Played(dog, pose(HANGING), *[pose({**HANGING, **bow})] * 2)
+    height = np.ptp(dog.vertices[:, 1])
+    assert -0.35 * height < shown.chest[-1] - shown.chest[0] < -0.15 * height
+    assert np.abs(shown.lows[-1]).max() < 0.02 * height
 
 
 def on_four() -> Skeleton:
