@@ -8,7 +8,7 @@ from pathlib import Path
 from runtime.cli.options.arguments import size
 from runtime.cli.options.show_options import add_character_option
 
-HELP = "draw the paper's figures on squash and stretch, or pictures of the window"
+HELP = "draw figures of the papers on squash and stretch or on editing, or pictures of the window"
 USAGE = "DIR [OPTIONS]"
 
 
@@ -19,7 +19,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     drawn = parser.add_argument_group("what is drawn")
     drawn.add_argument(
         "--of",
-        choices=("paper", "window"),
+        choices=("paper", "editing", "window"),
         default="paper",
         help="the paper's figures 5 to 7, or the window at work (default: paper)",
     )
@@ -39,6 +39,11 @@ def run(options: argparse.Namespace) -> int:
         from runtime.figures.window import draw_window
 
         print("\n".join(draw_window(options.folder, options.size or (1280, 720))))
+        return 0
+    if options.of == "editing":
+        from runtime.figures.editing import draw_editing
+
+        print("\n".join(draw_editing(options.folder, options.size or (1500, 420))))
         return 0
     from runtime.characters.open_character import load_character
     from runtime.figures.paper_figures import draw_figures
