@@ -9,6 +9,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 
 from runtime.panel.gui import GOLD, LACQUER, PAPER
 from runtime.panel.widgets import Colour, card, dot, fitted, letters
+from runtime.session.transport import Mode
 from runtime.status.notices import Notice
 from runtime.status.prompts import advice, countdown, details, headline, is_paused
 from runtime.status.show_status import ShowStatus
@@ -86,7 +87,8 @@ def _draw_hands_free(status: ShowStatus, scale: float) -> None:
 def _light(status: ShowStatus) -> Colour:
     """The colour of what is seen: green only while somebody drives the characters."""
     sight = status.sighting.sight
-    if status.frozen or is_paused(status):
+    plays = status.session is not None and status.session.mode in (Mode.PLAYING, Mode.PAUSED)
+    if status.frozen or plays or is_paused(status):
         return GREY
     return GOLD if sight is Sight.SEEN and status.matching else SIGHTS[sight]
 

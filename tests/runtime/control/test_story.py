@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
+import moderngl
+import numpy as np
 import pytest
 
 from devices.errors import InputError
@@ -14,6 +16,7 @@ from runtime.characters.open_character import load_character
 from runtime.cli.command_line import main
 from runtime.driving.by_hand.choosing import Target
 from runtime.panel.timeline import Timeline
+from runtime.render.context import renderer_name
 from runtime.render.picking import on_screen
 from runtime.session.document import Session
 from runtime.session.files.store import SessionStore
@@ -24,22 +27,35 @@ from runtime.show.show import Show
 from runtime.status.prompts import advice, headline
 from tests.runtime.control.x_input import XInput
 from tests.runtime.output.files.test_point_cache import read_pc2
+from tests.runtime.render.golden import Picture, assert_like_golden, save_golden
 
 SIZE = (960, 540)
+
+
+class Clock:
+    """The show's time [s], which a test lets go by."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
 
 
 class Puppeteer:
     """Somebody at the window of a show."""
 
-    def __init__(self, show: Show, path: Path) -> None:
-        self.show, self.path = show, path
+    def __init__(self, show: Show, path: Path, clock: Clock) -> None:
+        self.show, self.path, self.clock = show, path, clock
         window = show._opened.display.window
         assert window is not None
         self.hands = XInput(window.handle)
+        self.hands.move(0.7 * SIZE[0], 0.3 * SIZE[1])  # where nothing is pointed at
         self.perform(4)
 
     def perform(self, frames: int) -> None:
         for _ in range(frames):
+            self.clock.now += 0.1
             self.show.tick()
 
     def press(self, *keys: str) -> None:
@@ -78,6 +94,27 @@ class Puppeteer:
         return controls._panel._timeline  # type: ignore[union-attr]  # the window has a panel
 
     @property
+    def seen(self) -> Picture:
+        """(H, W, 4) what the window shows, a while after anything was said or moved."""
+        self.perform(4)
+        opened = self.show._opened
+        scene, controls = self.show.controls.scene, opened.window_controls
+        assert scene is not None
+        assert controls is not None
+        self.clock.now += 10.0
+        for _ in range(4):  # until the panel has found its size
+            self.clock.now += 0.2
+            target = scene.stage._context.simple_framebuffer(SIZE, components=4)
+            scene.redraw()
+            scene.stage.show(target)
+            controls._panel.draw(target)  # type: ignore[union-attr]  # the window has a panel
+            read = np.frombuffer(target.read(components=4, alignment=1), np.uint8)
+            target.release()
+        picture = read.reshape(SIZE[1], SIZE[0], 4)[::-1].copy()
+        picture[..., 3] = 255
+        return picture
+
+    @property
     def told(self) -> tuple[str, str]:
         """What the window says: what is seen, and what to do next."""
         status = self.show._opened.status()
@@ -88,25 +125,45 @@ class Puppeteer:
 def puppeteer(display: None, tmp_path: Path) -> Iterator[Puppeteer]:
     path = tmp_path / "show.bunraku"
     stream = play(builtin_recording("show"), every_frame=True, loop=True)
-    settings = ShowSettings(window=True, size=SIZE)
+    settings = ShowSettings(window=True, size=SIZE, origin="show.mcap")
+    clock, store = Clock(), SessionStore(path)
     try:
-        show = Show(stream, [load_character("squid")], settings, session=SessionStore(path))
+        show = Show(stream, [load_character("squid")], settings, session=store, clock=clock)
     except InputError as error:
         pytest.skip(f"no window here: {error}")
     with show:
         try:
-            yield Puppeteer(show, path)
+            yield Puppeteer(show, path, clock)
         except OSError as error:
             pytest.skip(f"no real keys here: {error}")
 
 
-def test_three_takes_are_layered_undone_scrubbed_saved_recovered_and_rendered(
-    puppeteer: Puppeteer, tmp_path: Path
-) -> None:
-    one = puppeteer
+@pytest.fixture
+def looks(pytestconfig: pytest.Config, tmp_path: Path) -> Callable[[str, Picture], None]:
+    """Compares a picture of the window with the golden one, where that was drawn as here."""
+    (tmp_path / "story").mkdir()
+
+    def compare(name: str, picture: Picture) -> None:
+        if "llvmpipe" not in renderer_name(moderngl.get_context()):
+            return
+        if pytestconfig.getoption("--regenerate-golden"):
+            save_golden(f"story/{name}", picture)
+        assert_like_golden(f"story/{name}", picture, tmp_path)
+
+    return compare
+
+
+def record_three_takes(one: Puppeteer, looks: Callable[[str, Picture], None]) -> None:
+    """Match by a pose, take one of the matches, and record three takes over one another."""
+    one.press("m", "3")
+    assert one.told[0] == "Looking for a match"
+    assert "match 3 of" in one.told[1]
+    looks("matching", one.seen)
+    one.press("enter")
     assert "Press r to record a take" in one.told[1]
     one.press("r")
     assert one.told == ("Recording", "Perform! Press r again to end the take.")
+    looks("recording", one.seen)
     one.perform(30)
     one.press("r")
     assert "Space plays the takes" in one.told[1]
@@ -115,7 +172,14 @@ def test_three_takes_are_layered_undone_scrubbed_saved_recovered_and_rendered(
         one.perform(15)
         one.press("r")
     assert len(one.session.clips) == 3
+    looks("layered", one.seen)
 
+
+def test_three_takes_are_layered_undone_scrubbed_saved_recovered_and_rendered(
+    puppeteer: Puppeteer, looks: Callable[[str, Picture], None], tmp_path: Path
+) -> None:
+    one = puppeteer
+    record_three_takes(one, looks)
     one.press("u")
     assert len(one.session.clips) == 2
     one.press("y")
@@ -125,6 +189,10 @@ def test_three_takes_are_layered_undone_scrubbed_saved_recovered_and_rendered(
     one.drag((left + 20.0, top + 8.0), (left + 40.0, top + 8.0))
     assert one.mode is Mode.PAUSED
     assert one.told[0] == "Paused"
+    one.press("f10")
+    one.perform(20)
+    looks("scrubbed", one.seen)
+    one.press("f10")
     highest = one.session.clips[-1]
     row = top + (20.0 + 11.0) * SIZE[1] / 720.0
     one.drag((left + 12.0, row), (left + 60.0, row), (left + 120.0, row))

@@ -8,7 +8,7 @@ import os
 import glfw
 
 KEYSYMS = {"space": 0x20, "escape": 0xFF1B, "home": 0xFF50, "delete": 0xFFFF, "f2": 0xFFBF}
-KEYSYMS |= {"enter": 0xFF0D, "end": 0xFF57, "f6": 0xFFC3, "f8": 0xFFC5}
+KEYSYMS |= {"enter": 0xFF0D, "end": 0xFF57, "f6": 0xFFC3, "f8": 0xFFC5, "f10": 0xFFC7}
 
 
 class XInput:
