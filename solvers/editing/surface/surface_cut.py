@@ -80,7 +80,8 @@ def cut_surface(sheet: Sheet, blade: Blade, at: ArrayLike) -> tuple[Derived, Der
     goes through. Closed surfaces stay closed. Open ones are closed at the rims that are. Vertices
     near the blade are moved onto it along an edge, so that no slivers stay. A cap has edges as long
     as those round it, and continues what its rim carries: what vertices carry smoothly, what copies
-    carry as the nearest place of the rim has it, so that no texture is smeared across a seam.
+    carry as the nearest place of the rim has it, of one chart of the texture for each triangle.
+    Where a chart meets itself at the rim, its texture is smeared over one row of triangles.
 
     Args:
         sheet: the surface, as it is seen where it is cut.
