@@ -44,6 +44,20 @@ class _Figure:
     chains: Sequence[Array]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Body:
+    """What does not change of a performer and a character.
+
+    Attributes:
+        shown: (J,) the joints that are drawn.
+        of_performer, of_character: the joints or nodes of each line along bones.
+    """
+
+    shown: NDArray[np.bool]
+    of_performer: Sequence[list[int]]
+    of_character: Sequence[list[int]]
+
+
 class MatchPictures:
     """Draws the best matches on a card of their own while one is looked for; a click takes one.
 
@@ -58,6 +72,8 @@ class MatchPictures:
         self._colours: list[list[int]] = []
         self._shown: int | None = None
         self._whose = ""
+        self._bodies: dict[int, _Body] = {}
+        self._drawn: dict[int, tuple[tuple[float, float], list[tuple[Line, int, float]]]] = {}
 
     def draw(
         self,
@@ -92,6 +108,7 @@ class MatchPictures:
     def _look(self, status: ShowStatus, controls: ShowControls, scale: float) -> None:
         """Make the pictures of the character whose match the arrows step through."""
         matching, self._pictures = controls.match_controls, []
+        self._drawn.clear()
         selected = matching.selected
         numbers = range(len(status.characters)) if selected is None else [selected]
         if controls.chooser.on:
@@ -116,12 +133,16 @@ class MatchPictures:
         pose = performer.pose
         if pose is None:
             return
-        parents, shown = body_bones(performer.skeleton)
-        joints = np.where(shown[:, None], pose.seen[:, :2], np.nan)
+        if number not in self._bodies:
+            parents, shown = body_bones(performer.skeleton)
+            self._bodies[number] = _Body(shown, _ways(parents), _ways(tree.parents))
+        body = self._bodies[number]
+        joints = np.where(body.shown[:, None], pose.seen[:, :2], np.nan)
         view = np.eye(3) if controls.scene is None else controls.scene.camera.view_rotation
         left = _placed(joints, "performer", scale)
         right = _placed((tree.positions @ view.T)[:, :2], "character", scale)
-        of_performer, of_character = _bones(left, parents), _bones(right, tree.parents)
+        of_performer = [left[way] for way in body.of_performer]
+        of_character = [right[way] for way in body.of_character]
         for mapping in mappings:
             chains = [(left[list(d.source)], right[list(d.target)]) for d in mapping.drives]
             self._pictures.append(
@@ -148,18 +169,25 @@ class MatchPictures:
         paint, rounding = imgui.get_window_draw_list(), 6.0 * scale
         ground = 0.16 if imgui.is_item_hovered() else 0.07
         paint.add_rect_filled(at, end, _shade(PAPER, ground), rounding)
-        middle = np.array([at.x + size.x / 2.0, at.y + size.y / 2.0])
-        for figure in self._pictures[rank - 1]:
-            for bone in figure.bones:
-                paint.add_polyline(_line(bone + middle), _shade(PAPER, 0.35), BONE * scale, 0)
-            for chain, colour in zip(figure.chains, self._colours[rank - 1], strict=True):
-                shade = _shade(_encoded(colour), 1.0)
-                paint.add_polyline(_line(chain + middle), shade, CHAIN * scale, 0)
+        if rank not in self._drawn or self._drawn[rank][0] != (at.x, at.y):
+            middle = np.array([at.x + size.x / 2.0, at.y + size.y / 2.0])
+            self._drawn[rank] = (at.x, at.y), self._lines(rank, middle, scale)
+        for line, shade, width in self._drawn[rank][1]:
+            paint.add_polyline(line, shade, width, 0)
         if rank - 1 == self._shown:
             paint.add_rect(at, end, _shade(GOLD, 1.0), rounding, 2.5 * scale)
         corner = ImVec2(at.x + 6.0 * scale, at.y + 3.0 * scale)
         with letters(SMALL):
             paint.add_text(corner, _shade(GOLD, 1.0), str(rank))
+
+    def _lines(self, rank: int, middle: Array, scale: float) -> list[tuple[Line, int, float]]:
+        """The lines of a picture around its middle [px], with colour and width: chains on top."""
+        faint, lines = _shade(PAPER, 0.35), []
+        for figure in self._pictures[rank - 1]:
+            lines += [(_line(bone + middle), faint, BONE * scale) for bone in figure.bones]
+            for chain, colour in zip(figure.chains, self._colours[rank - 1], strict=True):
+                lines.append((_line(chain + middle), _shade(_encoded(colour), 1.0), CHAIN * scale))
+        return lines
 
 
 def _placed(points: Array, who: str, scale: float) -> Array:
@@ -173,8 +201,8 @@ def _placed(points: Array, who: str, scale: float) -> Array:
     return placed
 
 
-def _bones(points: Array, parents: NDArray[np.int64]) -> list[Array]:
-    """The bones of a figure in as few lines as there are tips: each begins where one was drawn."""
+def _ways(parents: NDArray[np.int64]) -> list[list[int]]:
+    """The bones of a figure in as few lines as there are tips: each ends where one was drawn."""
     inner = set(parents.tolist())
     drawn: set[int] = set()
     lines = []
@@ -184,7 +212,7 @@ def _bones(points: Array, parents: NDArray[np.int64]) -> list[Array]:
             drawn.add(node)
             node = int(parents[node])
             line.append(node)
-        lines.append(points[line])
+        lines.append(line)
     return lines
 
 
