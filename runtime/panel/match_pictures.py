@@ -61,6 +61,8 @@ class _Body:
 class MatchPictures:
     """Draws the best matches on a card of their own while one is looked for; a click takes one.
 
+    The work after each look at the show is spread over several pictures of the window.
+
     Attributes:
         left: where the card begins, from the left of the picture [px].
     """
@@ -72,6 +74,8 @@ class MatchPictures:
         self._colours: list[list[int]] = []
         self._shown: int | None = None
         self._whose = ""
+        self._behind = False
+        self._stale: set[int] = set()
         self._bodies: dict[int, _Body] = {}
         self._drawn: dict[int, tuple[tuple[float, float], list[tuple[Line, int, float]]]] = {}
 
@@ -84,9 +88,10 @@ class MatchPictures:
         scale: float,
     ) -> float:
         """Draw the card `above` the lower border; return how high it is, 0 without one [px]."""
-        if status is not self._of:
-            self._of = status
+        fresh, self._of = status is not self._of, status
+        if self._behind or (fresh and not self._pictures):
             self._look(status, controls, scale)
+        self._behind = fresh
         if not self._pictures:
             self.left = math.inf
             return 0.0
@@ -98,17 +103,18 @@ class MatchPictures:
             with letters(SMALL):
                 count = len(self._pictures)
                 imgui.text_disabled(f"Best matches{self._whose}: click one, or press 1 to {count}")
+            turn = min(self._stale, default=0)
+            self._stale.discard(turn)
             for rank in range(1, count + 1):
                 if rank > 1:
                     imgui.same_line()
-                self._draw_one(rank, controls, scale)
+                self._draw_one(rank, controls, scale, anew=rank == turn)
             height: float = imgui.get_window_size().y
         return height + margin
 
     def _look(self, status: ShowStatus, controls: ShowControls, scale: float) -> None:
         """Make the pictures of the character whose match the arrows step through."""
         matching, self._pictures = controls.match_controls, []
-        self._drawn.clear()
         selected = matching.selected
         numbers = range(len(status.characters)) if selected is None else [selected]
         if controls.chooser.on:
@@ -119,6 +125,7 @@ class MatchPictures:
                 name = f" for {status.characters[number].name}"
                 self._whose = name if len(status.characters) > 1 else ""
                 self._picture(number, mappings, controls, scale)
+                self._stale = set(range(1, len(mappings) + 1))
                 self._paint(mappings, status)
                 drives = match.mapping.drives
                 shown = (rank for rank, each in enumerate(mappings) if each.drives == drives)
@@ -159,7 +166,7 @@ class MatchPictures:
         numbers = iter(colour_numbers([*lit, *drives])[len(lit) :])
         self._colours = [list(itertools.islice(numbers, len(each.drives))) for each in mappings]
 
-    def _draw_one(self, rank: int, controls: ShowControls, scale: float) -> None:
+    def _draw_one(self, rank: int, controls: ShowControls, scale: float, *, anew: bool) -> None:
         size = ImVec2(SIZE[0] * scale, SIZE[1] * scale)
         at = imgui.get_cursor_screen_pos()
         if imgui.invisible_button(f"match-{rank}", size):
@@ -169,7 +176,7 @@ class MatchPictures:
         paint, rounding = imgui.get_window_draw_list(), 6.0 * scale
         ground = 0.16 if imgui.is_item_hovered() else 0.07
         paint.add_rect_filled(at, end, _shade(PAPER, ground), rounding)
-        if rank not in self._drawn or self._drawn[rank][0] != (at.x, at.y):
+        if anew or rank not in self._drawn or self._drawn[rank][0] != (at.x, at.y):
             middle = np.array([at.x + size.x / 2.0, at.y + size.y / 2.0])
             self._drawn[rank] = (at.x, at.y), self._lines(rank, middle, scale)
         for line, shade, width in self._drawn[rank][1]:

@@ -102,7 +102,7 @@ class Puppeteer:
         assert scene is not None
         assert controls is not None
         self.clock.now += 10.0
-        for _ in range(4):  # until the panel has found its size
+        for _ in range(12):  # until the panel has found its size, and its small pictures are new
             self.clock.now += 0.2
             target = scene.stage._context.simple_framebuffer(SIZE, components=4)
             scene.redraw()

@@ -63,7 +63,7 @@ def test_each_shows_what_drives_what_in_one_colour(screen: Screen, show: StagedS
     show.strike()
     match = show.match_session.matches[0]
     assert len(match.best) == 4
-    picture = screen.draw(4)
+    picture = screen.draw(12)
     for one, mapping in zip(pictures(picture), match.best, strict=True):
         of_performer, of_character = shares(one)
         assert of_performer == of_character
