@@ -8,7 +8,7 @@ from pathlib import Path
 from runtime.cli.options.arguments import size
 from runtime.cli.options.show_options import add_character_option
 
-HELP = "draw figures of the papers on squash and stretch or on editing, or pictures of the window"
+HELP = "draw figures of the papers, of editing, or pictures of the window"
 USAGE = "DIR [OPTIONS]"
 
 
@@ -21,7 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--of",
         choices=("paper", "editing", "window"),
         default="paper",
-        help="the paper's figures 5 to 7, or the window at work (default: paper)",
+        help="the paper's figures 5 to 7, the figures on editing, or the window (default: paper)",
     )
     drawn.add_argument(
         "--size",

@@ -46,6 +46,7 @@ REMEMBERS = {
     "runtime.driving.performer.Performer",
     "runtime.driving.body.body_driver.BodyDriver",
     "runtime.driving.body.footing.Footing",
+    "runtime.driving.body.steady_trunk.SteadyTrunk",
     "runtime.driving.polyline_driver.SkinnedPolylineDriver",
     "runtime.driving.matching.puppet_match.PuppetMatch",
     "runtime.driving.unfreeze_blend.UnfreezeBlend",
@@ -63,6 +64,7 @@ REMEMBERS = {
     "solvers.retarget.foot_contacts.FootContacts",
     "solvers.retarget.foot_lock.FootLock",
     "solvers.retarget.hip_shift.HipShift",
+    "solvers.retarget.limb_posing.LimbPoser",
     "solvers.retarget.sole_pitch.SolePitch",
     "solvers.retarget.steady_ends.SteadyEnds",
     "solvers.retarget.match_hysteresis.MatchHysteresis",
@@ -83,6 +85,7 @@ IN_ANOTHERS_STATE = {
 """Classes whose memory can be computed again, and the class whose state holds what is needed."""
 
 NO_MEMORY = {
+    "replay.recorded_stream.RecordedStream": "keeps the newest frame for takes, not for the show",
     "runtime.show.clock.StageTimer": "measures; no frame depends on it",
     "runtime.status.stream_watch.StreamWatch": "watches the host's clock, not the stream's frames",
     "solvers.deform.skinning.SkinnedSurface": "scratch arrays, written before they are read",
