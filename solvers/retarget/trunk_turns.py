@@ -116,24 +116,36 @@ def orientations(joints: Array, of: TrunkJoints) -> Array:
 
 @kernel
 def _orientations(joints: Array, of: TrunkJoints, out: Array) -> None:
-    hips, shoulders = of.hips, of.shoulders
-    low = _middle(joints, hips[0], hips[1])
-    high = _middle(joints, shoulders[0], shoulders[1])
-    if of.neck >= 0:
-        high = point(joints, of.neck)
-    waist = point(joints, of.waist) if of.waist >= 0 else high
-    if hips[0] >= 0:
-        _put(out, 0, _frame(_gap(joints, hips[1], hips[0]), minus(waist, low)))
-    if of.waist < 0:
-        waist = low
-    if shoulders[0] >= 0:
-        _put(out, 1, _frame(_gap(joints, shoulders[1], shoulders[0]), minus(high, waist)))
+    hips, waist, chest, rise = _ways(joints, of)
+    if of.hips[0] >= 0:
+        _put(out, 0, _frame(hips, waist))
+    if of.shoulders[0] >= 0:
+        _put(out, 1, _frame(chest, rise))
     if of.face[2] >= 0:
         left = _gap(joints, of.face[1], of.face[0])
         nose = point(joints, of.face[2])
         front = minus(nose, _middle(joints, of.face[0], of.face[1]))
         # y is what is perpendicular to both, so that a nose below the ears makes no nod
         _put(out, 2, _frame(left, cross(front, left)))
+
+
+@kernel
+def _ways(joints: Array, of: TrunkJoints) -> tuple[Vector, Vector, Vector, Vector]:
+    """To the left and up [m] of pelvis and chest; what the joints do not show means nothing."""
+    hips, shoulders = of.hips, of.shoulders
+    low = _middle(joints, hips[0], hips[1])
+    high = _middle(joints, shoulders[0], shoulders[1])
+    if of.neck >= 0:
+        high = point(joints, of.neck)
+    below, above = high, low  # without a waist, both reach from the hips to the neck
+    if of.waist >= 0:
+        below = above = point(joints, of.waist)
+    return (
+        _gap(joints, hips[1], hips[0]),
+        minus(below, low),
+        _gap(joints, shoulders[1], shoulders[0]),
+        minus(high, above),
+    )
 
 
 @kernel
@@ -180,18 +192,11 @@ def levers(joints: Array, of: TrunkJoints) -> Array:
 
 @kernel
 def _levers(joints: Array, of: TrunkJoints, out: Array) -> None:
-    hips, shoulders = of.hips, of.shoulders
-    low = _middle(joints, hips[0], hips[1])
-    high = _middle(joints, shoulders[0], shoulders[1])
-    if of.neck >= 0:
-        high = point(joints, of.neck)
-    waist = point(joints, of.waist) if of.waist >= 0 else high
-    if hips[0] >= 0:
-        _measure(_gap(joints, hips[1], hips[0]), minus(waist, low), out, 0)
-    if of.waist < 0:
-        waist = low
-    if shoulders[0] >= 0:
-        _measure(_gap(joints, shoulders[1], shoulders[0]), minus(high, waist), out, 1)
+    hips, waist, chest, rise = _ways(joints, of)
+    if of.hips[0] >= 0:
+        _measure(hips, waist, out, 0)
+    if of.shoulders[0] >= 0:
+        _measure(chest, rise, out, 1)
 
 
 @kernel
