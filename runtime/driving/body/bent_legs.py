@@ -38,8 +38,7 @@ class BentLegs:
         upright = bodies.upright[self._ankles] - bodies.upright[self._hips]
         self._long = np.maximum(np.linalg.norm(upright, axis=1, keepdims=True), _NOTHING)
         # Feet that are set apart at rest, as in the first pose of many files, do not stand so.
-        left = np.array([np.cos(bodies.facing), 0.0, -np.sin(bodies.facing)])
-        self._along = upright - (upright @ left)[:, None] * left
+        self._along = upright - (upright @ bodies.left)[:, None] * bodies.left
         self._along /= np.maximum(np.linalg.norm(self._along, axis=1, keepdims=True), _NOTHING)
         rest = bodies.tree.positions
         self._ways = rest[self._joints[:, 2]] - rest[self._joints[:, 0]]

@@ -9,12 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.bodies.body_plan import SIDES
-from devices.bodies.plan_by_names import plan_by_names
-from devices.bodies.rest_heading import rest_heading
 from devices.errors import InputError
 from runtime.driving.body.bearing import Bearing, is_low, levelled, low_bearing, room_below
 from runtime.driving.body.bent_legs import BentLegs
-from runtime.driving.body.body_parts import TwoBodies, body_parts
+from runtime.driving.body.body_parts import TwoBodies, body_parts, two_bodies
 from runtime.driving.body.footing import Footing, FootingState
 from runtime.driving.body.forelegs import Forelegs
 from runtime.driving.body.held_hands import HeldHands, are_held
@@ -94,7 +92,7 @@ class BodyDriver:
 
     def __init__(self, pairing: Pairing) -> None:
         self._skeleton = skeleton = pairing.skeleton
-        bodies, heading_at_rest = _two_bodies(pairing)
+        bodies, heading_at_rest = two_bodies(pairing)
         parts = body_parts(bodies, self.least_upright)
         if parts is None:
             raise InputError(f"{pairing.character.name} has no part that the performer has too")
@@ -129,7 +127,7 @@ class BodyDriver:
             theirs = float(np.linalg.norm(np.diff(bodies.upright[self._their_hips], axis=0)))
             ours = float(np.linalg.norm(np.diff(bodies.tree.positions[self._hips], axis=0)))
             self._sinking = min(self._ratio * theirs / max(ours, 1e-9), 1.0)
-        self._left = np.array([np.cos(bodies.facing), 0.0, -np.sin(bodies.facing)])
+        self._left = bodies.left
         self._footing = Footing(bodies, parts, vertices, owner)
         self._ends, self._bent_legs = _ends(bodies), BentLegs(bodies, parts.legs)
         self._held_hands = HeldHands(bodies) if are_held(bodies) else None
@@ -190,11 +188,7 @@ class BodyDriver:
         trunk[0] = levelled(trunk[0], self._sinking, self._left)
         self._footing.watch(pose)
         left = rotate(trunk[0], self._left)
-        trunk = self._rearing.reared(trunk, joints, left)
-        if self._serpent is not None:
-            trunk = self._serpent.bearing(joints).of(trunk)
-        if self._bearing is not None:
-            trunk = self._bearing.of(trunk)
+        trunk = self._borne(trunk, joints, left)
         self._footing.turn_soles(joints, left, pose.time, given)
         self._wings.spread(joints, trunk[1], given)
         self._limbs.pose(joints, trunk, given, rotations, positions)
@@ -212,23 +206,52 @@ class BodyDriver:
         if self._long_arms.raise_arms(positions, rotations, given, across, above):
             self._limbs.pose(joints, trunk, given, rotations, positions)
         path = self._path(pose, rest, heading, positions)
-        plants = self._many_legs is None  # many feet stay where they stand as it is
-        if self._goes_along and plants:
-            shift = self._footing.hip_shift(pose, positions, path.performer_on_stage, path.on_stage)
-            path = replace(path, shift=shift)
-        if plants and self._footing.plant(
+        if self._many_legs is None:  # many feet stay where they stand as it is
+            path, bends = self._planted(pose, path, (positions, rotations), left, given)
+            if bends:
+                self._limbs.pose(joints, trunk, given, rotations, positions)
+        self._nodes = PosedNodes(positions, rotations)
+        placement = path.placement(self._footing.clearance(pose))
+        return Targets(self._skeleton.skinned(self._nodes), placement, self._nodes)
+
+    def _borne(self, trunk: Array, joints: Array, left: Array) -> Array:
+        """The turns (3, 4) of the character's trunk for those of the performer's.
+
+        Args:
+            trunk: (3, 4) of the performer's pelvis, chest and head.
+            joints: (J, 3) [m] the performer, turned as the character faces.
+            left: (3,) the body's left.
+        """
+        trunk = self._rearing.reared(trunk, joints, left)
+        if self._serpent is not None:
+            trunk = self._serpent.bearing(joints).of(trunk)
+        return trunk if self._bearing is None else self._bearing.of(trunk)
+
+    def _planted(
+        self, pose: Pose, path: Path, nodes: tuple[Array, Array], left: Array, given: Array
+    ) -> tuple[Path, bool]:
+        """Keep feet planted: the path over them, and whether legs have to bend, as `given` says.
+
+        Args:
+            pose: of the performer.
+            path: of the hips as the performer's.
+            nodes: positions (K, 3) [m] and rotations (K, 4).
+            left: (3,) the body's left.
+            given: (S, 4) rotations of the segments; is changed.
+        """
+        if self._goes_along:
+            to_stage = path.performer_on_stage, path.on_stage
+            path = replace(path, shift=self._footing.hip_shift(pose, nodes[0], *to_stage))
+        bends = self._footing.plant(
             pose,
-            (positions, rotations),
+            nodes,
             left,
             given,
             performer_on_stage=path.performer_on_stage,
             on_stage=path.on_stage,
             off_stage=path.off_stage,
-        ):
-            self._limbs.pose(joints, trunk, given, rotations, positions)
-        self._nodes = PosedNodes(positions, rotations)
-        placement = path.placement(self._footing.clearance(pose))
-        return Targets(self._skeleton.skinned(self._nodes), placement, self._nodes)
+        )
+        return path, bends
 
     def _on_forelegs(
         self, nodes: tuple[Array, Array], joints: Array, trunk: Array, left: Array, given: Array
@@ -327,32 +350,6 @@ class BodyDriver:
         self._joint_turns.restore(state.rest_turn)
         self._footing.restore(state.footing)
         self._ends.restore(state.ends)
-
-
-def _two_bodies(pairing: Pairing) -> tuple[TwoBodies, float]:
-    """The performer and the character side by side; the heading [rad] of the performer at rest.
-
-    Raises:
-        InputError: one of them has no limbs that are known.
-    """
-    performer, character = pairing.performer, pairing.character
-    plan, source = character.plan, plan_by_names(performer)
-    if plan is None or source is None:
-        who = character.name if plan is None else "the performer"
-        raise InputError(f"{who} has no limbs that are known: use --drive relative")
-    facing = rest_heading(character.skeleton, plan)
-    heading_at_rest = rest_heading(performer, source)
-    bodies = TwoBodies(
-        performer=performer,
-        source=source,
-        joints=frozenset(pairing.joints),
-        upright=turned(performer.rest_positions, facing - heading_at_rest, np.zeros(3)),
-        character=character.skeleton,
-        plan=plan,
-        tree=pairing.skeleton.tree.rerooted(plan.hips),
-        facing=facing,
-    )
-    return bodies, heading_at_rest
 
 
 def _hips_that_lead(bodies: TwoBodies) -> list[int]:

@@ -11,10 +11,15 @@ from numpy.typing import NDArray
 from devices.bodies.body_plan import SIDES, BodyPlan, Chain, Limb
 from devices.bodies.joint_labels import label_joints
 from devices.bodies.joint_names import Kind, Side
+from devices.bodies.plan_by_names import plan_by_names
+from devices.bodies.rest_heading import rest_heading
+from devices.errors import InputError
 from devices.skeleton import Skeleton
 from runtime.driving.body.rig_builder import RigBuilder
 from runtime.driving.driver import ABSOLUTE, RELATIVE, DrivenPart
+from runtime.driving.pairing import Pairing
 from runtime.driving.part_names import part_name
+from solvers.retarget.heading import turned
 from solvers.retarget.limb_posing import LimbRig
 from solvers.retarget.trunk_turns import TrunkJoints
 from solvers.skeleton.tree import Tree
@@ -130,6 +135,16 @@ class TwoBodies:
     tree: Tree
     facing: float
 
+    @property
+    def left(self) -> Array:
+        """(3,) unit, the left of both while they stand upright."""
+        return np.array([np.cos(self.facing), 0.0, -np.sin(self.facing)])
+
+    @property
+    def front(self) -> Array:
+        """(3,) unit, where both look while they stand upright."""
+        return np.array([np.sin(self.facing), 0.0, np.cos(self.facing)])
+
     def part(self, source: Chain, target: Chain, drive: str) -> DrivenPart:
         """A chain of joints that drives a chain of nodes, in words."""
         name = part_name(self.performer, self.source, source)
@@ -156,6 +171,32 @@ class TwoBodies:
         """Whether the performer's head may drive the character's."""
         both = self.source.head and self.plan.head
         return bool(both) and not self.joints.isdisjoint(self.source.head[1:])
+
+
+def two_bodies(pairing: Pairing) -> tuple[TwoBodies, float]:
+    """Return performer and character side by side, and the performer's heading [rad] at rest.
+
+    Raises:
+        InputError: one of them has no limbs that are known.
+    """
+    performer, character = pairing.performer, pairing.character
+    plan, source = character.plan, plan_by_names(performer)
+    if plan is None or source is None:
+        who = character.name if plan is None else "the performer"
+        raise InputError(f"{who} has no limbs that are known: use --drive relative")
+    facing = rest_heading(character.skeleton, plan)
+    heading_at_rest = rest_heading(performer, source)
+    bodies = TwoBodies(
+        performer=performer,
+        source=source,
+        joints=frozenset(pairing.joints),
+        upright=turned(performer.rest_positions, facing - heading_at_rest, np.zeros(3)),
+        character=character.skeleton,
+        plan=plan,
+        tree=pairing.skeleton.tree.rerooted(plan.hips),
+        facing=facing,
+    )
+    return bodies, heading_at_rest
 
 
 def body_parts(bodies: TwoBodies, least_upright: float) -> BodyParts | None:

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from runtime.driving.body.body_parts import BodyParts, TwoBodies
-from runtime.driving.body.joint_turns import about_vertical
 from runtime.driving.performer import Pose
 from runtime.driving.root_motion import chain_length
 from solvers.retarget.clearance import STANDS, clearance
@@ -87,7 +86,7 @@ class Footing:
         self._shift = HipShift(np.array(lengths))
         self._lock = FootLock(np.array(lengths))
         ours = nodes[self._points[:, 1]] - nodes[self._points[:, 0]]
-        front = rotate(about_vertical(bodies.facing), np.array([0.0, 0.0, 1.0]))
+        front = bodies.front
         self._stands_up = _stands_up(nodes, self._joints, ours)
         lies = self._stands_up[:, 3] < 1.0
         leads = np.array([_leads(way, front, leg) for way in ours], dtype=np.bool_)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.bodies.joint_names import Side
-from runtime.driving.body.body_parts import Arm
+from runtime.driving.body.body_parts import Arm, TwoBodies
 from solvers.kernels.compiled import kernel
 from solvers.kernels.quaternion import (
     Vector,
@@ -25,7 +25,6 @@ from solvers.kernels.quaternion import (
     rotate,
 )
 from solvers.kernels.vector import dot, minus, norm, plus, point, scaled, unit
-from solvers.skeleton.tree import Tree
 
 Array = NDArray[np.float64]
 
@@ -37,19 +36,16 @@ class ForelegLimits:
     """Where the segments of forelegs can point, seen from the chest.
 
     Args:
-        tree: the character's nodes at rest.
+        bodies: the performer and the character.
         arms: the forelegs.
-        facing: [rad] of the character at rest.
     """
 
-    def __init__(self, tree: Tree, arms: Sequence[Arm], facing: float) -> None:
-        left = np.array([np.cos(facing), 0.0, -np.sin(facing)])
-        self._front = np.array([np.sin(facing), 0.0, np.cos(facing)])
+    def __init__(self, bodies: TwoBodies, arms: Sequence[Arm]) -> None:
+        left, self._front, rest = bodies.left, bodies.front, bodies.tree.positions
         self._out = [left if arm.side is Side.LEFT else -left for arm in arms]
         ends = [(*arm.starts[1:], arm.target[-1]) for arm in arms]
         self._along = [
-            tree.positions[list(end)] - tree.positions[list(arm.starts)]
-            for arm, end in zip(arms, ends, strict=True)
+            rest[list(end)] - rest[list(arm.starts)] for arm, end in zip(arms, ends, strict=True)
         ]
         _hold(np.zeros((0, 3)), np.zeros(4), left, self._front, np.zeros((0, 4)))
 

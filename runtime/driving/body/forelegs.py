@@ -104,8 +104,7 @@ class Forelegs:
         hind = [(leg.lower or leg.upper)[-1] for leg in bodies.plan.legs.values() if arms]
         self._soles = Soles(tree, [*(arm.wrist for arm in arms), *hind], *surface)
         self._floor, self._pointing = 0.0, [np.zeros((len(arm.starts), 4)) for arm in arms]
-        left = np.array([np.cos(bodies.facing), 0.0, -np.sin(bodies.facing)])
-        self._left = left
+        self._left = left = bodies.left
         upper, lower = places[:, 1] - places[:, 0], places[:, 2] - places[:, 0]
         bends = np.cross(upper, lower - upper) @ left
         sizes = np.linalg.norm(upper, axis=1) * np.linalg.norm(lower - upper, axis=1)
@@ -121,7 +120,7 @@ class Forelegs:
             lengths=np.array([chain_length(rest, chain) for chain in joints]),
             left=left,
         )
-        self._limits = ForelegLimits(tree, arms, bodies.facing)
+        self._limits = ForelegLimits(bodies, arms)
         self._own = np.array([SIDES.index(arm.side) for arm in arms], dtype=np.int64)
         self._performer = performer_steps(bodies)
         self._ratio = ratio

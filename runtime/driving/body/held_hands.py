@@ -32,11 +32,12 @@ class HeldHands:
         length = np.mean([chain_length(rest, arms[side].chain) for side in SIDES])
         width = float(np.linalg.norm(shoulders[0] - shoulders[1]))
         self._share = min(0.5 * width / max(float(length), 1e-9), _WIDEST)
-        left = np.array([np.cos(bodies.facing), 0.0, -np.sin(bodies.facing)])
         self._arms: list[tuple[Limb, list[int], Array]] = []
         for side, sign in zip(SIDES, (1.0, -1.0), strict=True):
             own = bodies.source.arms[side]
-            self._arms.append((own, list(bodies.performer.tree.subtree(own.upper[1])), sign * left))
+            self._arms.append(
+                (own, list(bodies.performer.tree.subtree(own.upper[1])), sign * bodies.left)
+            )
 
     def reach_from_shoulders(self, joints: Array) -> None:
         """Shift the hands of a pose (J, 3) [m], turned as the character faces, in place."""

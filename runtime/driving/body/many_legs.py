@@ -46,7 +46,7 @@ class ManyLegs:
         tree, rest = bodies.tree, bodies.tree.positions
         self._performer = performer_steps(bodies)
         self._room = room
-        self._left = np.array([np.cos(bodies.facing), 0.0, -np.sin(bodies.facing)])
+        self._left = bodies.left
         self._joints = np.array([step.target for step in steps], dtype=np.int64)
         self._segments = np.array([step.segments for step in steps], dtype=np.int64)
         self._carriers = np.array([tree.parents[step.target[0]] for step in steps])

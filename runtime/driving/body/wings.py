@@ -100,10 +100,9 @@ def _wing(bodies: TwoBodies, arm: Arm) -> _Wing:
     half = min(half, max(len(places) - 2, 1))
     ways = np.stack([places[half] - places[0], places[-1] - places[min(half, len(places) - 2)]])
     along = ways / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), 1e-12)
-    left = np.array([np.cos(bodies.facing), 0.0, -np.sin(bodies.facing)])
     return _Wing(
         joints=(theirs.upper[0], lower[0], lower[-1]),
-        out=left if arm.side is Side.LEFT else -left,
+        out=bodies.left if arm.side is Side.LEFT else -bodies.left,
         along=along,
         shares=share * share * (3.0 - 2.0 * share),
         segments=np.array(arm.segments, dtype=np.int64),
