@@ -61,7 +61,7 @@ class _Body:
 class MatchPictures:
     """Draws the best matches on a card of their own while one is looked for; a click takes one.
 
-    The work after each look at the show is spread over several pictures of the window.
+    One of them is laid out anew in each picture of the window, each in its turn.
 
     Attributes:
         left: where the card begins, from the left of the picture [px].
@@ -75,7 +75,7 @@ class MatchPictures:
         self._shown: int | None = None
         self._whose = ""
         self._behind = False
-        self._stale: set[int] = set()
+        self._turn = 0  # the picture that was laid out last, from 1
         self._bodies: dict[int, _Body] = {}
         self._drawn: dict[int, tuple[tuple[float, float], list[tuple[Line, int, float]]]] = {}
 
@@ -103,12 +103,11 @@ class MatchPictures:
             with letters(SMALL):
                 count = len(self._pictures)
                 imgui.text_disabled(f"Best matches{self._whose}: click one, or press 1 to {count}")
-            turn = min(self._stale, default=0)
-            self._stale.discard(turn)
+            self._turn = self._turn % count + 1
             for rank in range(1, count + 1):
                 if rank > 1:
                     imgui.same_line()
-                self._draw_one(rank, controls, scale, anew=rank == turn)
+                self._draw_one(rank, controls, scale, anew=rank == self._turn)
             height: float = imgui.get_window_size().y
         return height + margin
 
@@ -125,7 +124,6 @@ class MatchPictures:
                 name = f" for {status.characters[number].name}"
                 self._whose = name if len(status.characters) > 1 else ""
                 self._picture(number, mappings, controls, scale)
-                self._stale = set(range(1, len(mappings) + 1))
                 self._paint(mappings, status)
                 drives = match.mapping.drives
                 shown = (rank for rank, each in enumerate(mappings) if each.drives == drives)

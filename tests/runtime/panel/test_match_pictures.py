@@ -11,6 +11,7 @@ from runtime.panel.match_pictures import SIZE as PICTURE
 from runtime.render.tubes import PAIR_COLOURS
 from tests.runtime.panel.screen import SIZE, Screen, covered
 from tests.runtime.staged import StagedShow
+from tests.runtime.stick_figures import frame, pose
 
 GAP, PADDING = 8.0, 12.0 + 14.0  # [px] between pictures, and below them to the bar
 BESIDE = 296  # [px] a column of the picture between the legend and the card
@@ -93,3 +94,19 @@ def test_they_are_there_only_while_a_match_is_looked_for(screen: Screen, show: S
     picture = screen.draw(4)
     assert left.left > SIZE[0]
     assert not covered(picture)[400 : bar_begins(picture), BESIDE:].any()
+
+
+def test_all_of_them_follow_the_performer_however_often_the_show_is_looked_at(
+    screen: Screen, show: StagedShow
+) -> None:
+    show.strike()
+    moments = []
+    for angle in (0.0, 0.6):
+        show.performer.follow(frame(pose({"HipLeft": (-angle, 0.0, angle)}), 0.1 + angle))
+        for _ in range(8):
+            screen.now += 0.1  # so that every picture of the window looks at the show
+            picture = screen.draw(1)
+        moments.append(pictures(picture))
+    half = round(0.44 * PICTURE[0])
+    for one, other in zip(*moments, strict=True):
+        assert (one[:, :half] != other[:, :half]).any()
