@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from devices.bodies.body_plan import BodyPlan
 from devices.skeleton import Skeleton
 from runtime.characters.character import Character, Material, Surface
+from runtime.characters.plan_by_shape import plan_by_shape
+from solvers.skeleton.limbs import surface_points
+from solvers.skeleton.mirror_plane import mirror_planes
 from solvers.skeleton.tree import Tree
 
 BONE = 0.06  # [m], about
@@ -132,6 +136,17 @@ def character_of(body: CapsuleBody) -> Character:
         ),
         file_to_stage=np.eye(4),
     )
+
+
+def plan_of(body: CapsuleBody) -> BodyPlan | None:
+    """The plan of the body, found by its shape."""
+    planes = mirror_planes(surface_points(body.vertices, body.faces), 4)
+    return plan_by_shape(body.vertices, body.faces, body.tree, planes)
+
+
+def planned(body: CapsuleBody) -> Character:
+    """The body as a character with its plan."""
+    return replace(character_of(body), plan=plan_of(body))
 
 
 def _evenly(corners: Array) -> Array:

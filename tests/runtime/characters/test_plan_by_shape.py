@@ -13,9 +13,6 @@ from devices.bodies.joint_names import Side
 from devices.bodies.rest_heading import rest_heading
 from devices.skeleton import Skeleton
 from runtime.characters.open_character import load_character
-from runtime.characters.plan_by_shape import plan_by_shape
-from solvers.skeleton.limbs import surface_points
-from solvers.skeleton.mirror_plane import mirror_planes
 from tests.runtime.capsule_bodies import (
     DOG,
     MOUSE,
@@ -24,16 +21,12 @@ from tests.runtime.capsule_bodies import (
     CapsuleBody,
     both,
     capsule_body,
+    plan_of,
 )
 from tests.thorough import combined, third_of
 
 BODIES = {"person": PERSON, "mouse": MOUSE, "dog": DOG}
 MIRROR = np.diag([-1.0, 1.0, 1.0])
-
-
-def planned(body: CapsuleBody) -> BodyPlan | None:
-    planes = mirror_planes(surface_points(body.vertices, body.faces), 4)
-    return plan_by_shape(body.vertices, body.faces, body.tree, planes)
 
 
 def heading(body: CapsuleBody, plan: BodyPlan) -> float:
@@ -63,7 +56,7 @@ def assert_roles(body: CapsuleBody, plan: BodyPlan | None, left: str = "L") -> N
 def test_a_body_has_the_same_roles_whichever_way_it_is_turned(name: str, yaw: float) -> None:
     branches = BODIES[name]
     body = capsule_body(branches).moved(turn(yaw), np.array([3.0, 0.5, -2.0]))
-    plan = planned(body)
+    plan = plan_of(body)
     assert_roles(body, plan)
     assert bool(plan.tail) == ("tail" in branches)
     assert plan.arm_word == ("foreleg" if branches is DOG else "arm")
@@ -73,20 +66,20 @@ def test_a_body_has_the_same_roles_whichever_way_it_is_turned(name: str, yaw: fl
 @pytest.mark.parametrize("branches", [MOUSE, DOG], ids=["mouse", "dog"])
 def test_left_and_right_swap_in_the_mirror(branches) -> None:
     body = capsule_body(branches).moved(MIRROR)
-    plan = planned(body)
+    plan = plan_of(body)
     assert_roles(body, plan, left="R")
     assert abs(heading(body, plan)) < 3.0
 
 
 def test_ears_are_no_arms() -> None:
     body = capsule_body({**PERSON, **both("ear", "head", [(0.2, 1.8, 0), (0.6, 1.9, 0)], 0.04)})
-    assert_roles(body, planned(body))
+    assert_roles(body, plan_of(body))
 
 
 def test_a_raised_tail_is_no_head() -> None:
     branches = {**DOG, "tail": ("hips", [(0, 0.8, -0.5), (0, 1.2, -0.5)], 0.03)}
     body = capsule_body(branches)
-    assert_roles(body, planned(body))
+    assert_roles(body, plan_of(body))
 
 
 def test_the_legs_of_an_animal_that_leaps_are_legs() -> None:
@@ -97,7 +90,7 @@ def test_the_legs_of_an_animal_that_leaps_are_legs() -> None:
     }
     places = [(-0.12, 0.5, 0.5), (-0.12, 0.2, 0.7), (-0.12, 0.02, 0.85)]
     body = capsule_body({**leap, "arm.R": ("trunk", places, 0.04)})
-    plan = planned(body)
+    plan = plan_of(body)
     assert_roles(body, plan)
     assert plan.arm_word == "foreleg"
 
@@ -112,7 +105,7 @@ def test_legs_in_mid_step_are_a_pair() -> None:
         for side, x, z in (("L", 0.11, 0.25), ("R", -0.11, -0.25))
     }
     body = capsule_body({**PERSON, **step})
-    assert_roles(body, planned(body))
+    assert_roles(body, plan_of(body))
 
 
 def test_fingers_belong_to_their_arm() -> None:
@@ -122,7 +115,7 @@ def test_fingers_belong_to_their_arm() -> None:
         for name, x, y in (("thumb", 0.62, 0.9), ("index", 0.7, 0.85), ("little", 0.72, 0.92))
     }
     body = capsule_body({**PERSON, **fingers})
-    plan = planned(body)
+    plan = plan_of(body)
     assert plan is not None
     for side, letter in zip(SIDES, "LR", strict=True):
         assert body.names(plan.arms[side].upper) == {f"arm.{letter}"}
@@ -130,19 +123,19 @@ def test_fingers_belong_to_their_arm() -> None:
 
 
 def test_more_than_four_legs_have_no_plan() -> None:
-    assert planned(capsule_body(SPIDER)) is None
+    assert plan_of(capsule_body(SPIDER)) is None
 
 
 def test_a_body_that_is_no_mirror_image_has_no_plan() -> None:
     lopsided = dict(PERSON)
     lopsided["arm.R"] = ("trunk", [(-0.1, 1.4, 0.8), (-0.1, 1.4, 1.6)], 0.15)
     lopsided["leg.R"] = ("hips", [(-0.1, 0.8, -0.5), (-0.1, 0.75, -1.2)], 0.15)
-    assert planned(capsule_body(lopsided)) is None
+    assert plan_of(capsule_body(lopsided)) is None
 
 
 def test_limbs_begin_outside_the_trunk_and_both_alike() -> None:
     body = capsule_body(MOUSE)
-    plan = planned(body)
+    plan = plan_of(body)
     assert plan is not None
     for limbs in (plan.arms, plan.legs):
         left, right = (body.tree.positions[limbs[side].upper[0]] for side in SIDES)

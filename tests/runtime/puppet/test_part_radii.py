@@ -9,18 +9,14 @@ import pytest
 
 from devices.bodies.joint_names import Side
 from runtime.characters.open_character import load_character
-from runtime.characters.plan_by_shape import plan_by_shape
 from runtime.puppet.part_radii import part_radii
 from runtime.puppet.puppet import Puppet
-from solvers.skeleton.limbs import surface_points
-from solvers.skeleton.mirror_plane import mirror_planes
-from tests.runtime.capsule_bodies import MOUSE, capsule_body
+from tests.runtime.capsule_bodies import MOUSE, capsule_body, plan_of
 
 
 def test_each_part_is_as_thick_as_it_was_made_and_legs_half_as_the_trunk() -> None:
     body = capsule_body(MOUSE)
-    planes = mirror_planes(surface_points(body.vertices, body.faces), 4)
-    plan = plan_by_shape(body.vertices, body.faces, body.tree, planes)
+    plan = plan_of(body)
     assert plan is not None
     tree = body.tree.rerooted(plan.hips)
     radii = part_radii(body.vertices, body.faces, tree, plan)

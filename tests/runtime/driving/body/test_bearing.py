@@ -2,18 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
-from runtime.characters.plan_by_shape import plan_by_shape
 from runtime.driving.body.body_driver import BodyDriver
 from runtime.driving.performer import Performer, rest_state
 from runtime.puppet.puppet import Puppet
-from solvers.skeleton.limbs import surface_points
-from solvers.skeleton.mirror_plane import mirror_planes
-from tests.runtime.capsule_bodies import DOG, Branches, both, capsule_body, character_of
+from tests.runtime.capsule_bodies import DOG, Branches, both, capsule_body, planned
 from tests.runtime.stick_figures import BODY, frame, paired, pose
 
 HANGING = {"ShoulderLeft": (0.0, 0.0, -0.75), "ShoulderRight": (0.0, 0.0, 0.75)}
@@ -30,11 +25,9 @@ LIZARD: Branches = {
 
 def dip(branches: Branches) -> float:
     """The angle [deg] by which the trunk of a body sinks in front when its performer bows."""
-    body = capsule_body(branches)
-    planes = mirror_planes(surface_points(body.vertices, body.faces), 4)
-    plan = plan_by_shape(body.vertices, body.faces, body.tree, planes)
+    puppet = Puppet(planned(capsule_body(branches)))
+    plan = puppet.character.plan
     assert plan is not None
-    puppet = Puppet(replace(character_of(body), plan=plan))
     driver = BodyDriver(paired(puppet))
     performer = Performer(BODY)
     start = performer.follow(frame(pose(HANGING), 0.0))

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from runtime.characters.character import Character
-from runtime.characters.plan_by_shape import plan_by_shape
-from solvers.skeleton.limbs import surface_points
-from solvers.skeleton.mirror_plane import mirror_planes
-from tests.runtime.capsule_bodies import DOG, both, capsule_body, character_of
+from tests.runtime.capsule_bodies import DOG, both, capsule_body, planned
 from tests.runtime.driving.body.test_forelegs import HANGING, Played
 from tests.runtime.stick_figures import BODY, pose
 
@@ -26,10 +21,7 @@ Array = NDArray[np.float64]
 
 @pytest.fixture(scope="module")
 def dog() -> Character:
-    body = capsule_body(CROUCHING)
-    planes = mirror_planes(surface_points(body.vertices, body.faces), 4)
-    plan = plan_by_shape(body.vertices, body.faces, body.tree, planes)
-    return replace(character_of(body), plan=plan)
+    return planned(capsule_body(CROUCHING))
 
 
 def bent_knees(angle: float) -> Array:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -12,14 +10,11 @@ from devices.bodies.body_plan import SIDES
 from devices.bodies.plan_by_names import plan_by_names
 from devices.skeleton import Skeleton
 from runtime.characters.character import Character
-from runtime.characters.plan_by_shape import plan_by_shape
 from runtime.driving.body.body_driver import BodyDriver
 from runtime.driving.pairing import Pairing
 from runtime.driving.performer import Performer, rest_state
 from runtime.puppet.puppet import Puppet
-from solvers.skeleton.limbs import surface_points
-from solvers.skeleton.mirror_plane import mirror_planes
-from tests.runtime.capsule_bodies import DOG, capsule_body, character_of
+from tests.runtime.capsule_bodies import DOG, capsule_body, planned
 from tests.runtime.stick_figures import BODY, frame, pose
 
 HANGING = {"ShoulderLeft": (0.0, 0.0, -0.75), "ShoulderRight": (0.0, 0.0, 0.75)}
@@ -30,10 +25,7 @@ Array = NDArray[np.float64]
 
 @pytest.fixture(scope="module")
 def dog() -> Character:
-    body = capsule_body(DOG)
-    planes = mirror_planes(surface_points(body.vertices, body.faces), 4)
-    plan = plan_by_shape(body.vertices, body.faces, body.tree, planes)
-    return replace(character_of(body), plan=plan)
+    return planned(capsule_body(DOG))
 
 
 class Played:
