@@ -35,6 +35,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="SESSION.bunraku",
         help="the session's file; a new one is made where there is none, and needs --character",
     )
+    _add_performer(parser)
+    _add_takes(parser)
+    _add_kiosk(parser)
+    add_playback_options(parser)
+    add_show_options(parser)
+    add_input_options(parser)
+
+
+def _add_performer(parser: argparse.ArgumentParser) -> None:
     who = parser.add_argument_group("performer and characters")
     performer = who.add_mutually_exclusive_group()
     performer.add_argument(
@@ -51,6 +60,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="a recorded performer, played again and again; with --fast once",
     )
     add_character_option(who, default="those of the session")
+
+
+def _add_takes(parser: argparse.ArgumentParser) -> None:
     take = parser.add_argument_group("takes and time")
     take.add_argument(
         "--take", action="store_true", help="begin a take as soon as somebody performs"
@@ -77,6 +89,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="S",
         help="begin at this second of the session (default: 0)",
     )
+
+
+def _add_kiosk(parser: argparse.ArgumentParser) -> None:
     alone = parser.add_argument_group("a show that nobody operates")
     alone.add_argument(
         "--kiosk",
@@ -91,9 +106,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="DIGITS",
         help="with --kiosk: lock keys and mouse until these digits are typed",
     )
-    add_playback_options(parser)
-    add_show_options(parser)
-    add_input_options(parser)
 
 
 def run(options: argparse.Namespace) -> int:
