@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from devices.bodies.joint_labels import first_of, label_joints
-from devices.bodies.joint_names import Kind, Side
+from devices.bodies.joint_names import BodyPart, Kind, Side
 from devices.skeleton import Skeleton
 from runtime.driving.performer import Pose
 
@@ -75,20 +75,14 @@ def arms_of(skeleton: Skeleton) -> tuple[Arm, ...]:
     return tuple(arms)
 
 
-def _fingertip(skeleton: Skeleton, parts: Sequence[object], side: Side) -> int | None:
+def _fingertip(skeleton: Skeleton, parts: Sequence[BodyPart | None], side: Side) -> int | None:
     """The last joint of the middle finger."""
     own = [
         joint
         for joint in skeleton.order
-        if (part := label_of(parts, joint)) is not None and part == (Kind.MIDDLE, side)
+        if (part := parts[joint]) is not None and part.kind is Kind.MIDDLE and part.side is side
     ]
     return own[-1] if own else None
-
-
-def label_of(parts: Sequence[object], joint: int) -> tuple[Kind, Side] | None:
-    """Kind and side of a joint; None where it is unknown."""
-    part = parts[joint]
-    return None if part is None else (part.kind, part.side)  # type: ignore[attr-defined]  # a part
 
 
 class Gestures:
