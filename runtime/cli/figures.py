@@ -8,7 +8,7 @@ from pathlib import Path
 from runtime.cli.options.arguments import size
 from runtime.cli.options.show_options import add_character_option
 
-HELP = "draw figures of the papers, of editing, or pictures of the window"
+HELP = "draw figures of the papers, edits of shapes, or pictures of the window"
 USAGE = "DIR [OPTIONS]"
 
 

@@ -19,7 +19,7 @@ class Conditioning:
         order: drop duplicate and late frames, and keep time rising where a clock jumps.
         identities: keep each performer's number when the sensor gives a new one.
         swaps: put limbs right whose left and right are exchanged.
-        outliers: reject joints that jump and bones that stretch.
+        outliers: reject joints that jump or are only guessed, and bones that stretch.
         filter: smooth (One-Euro).
         predict: predict joints one frame ahead.
         level: make the floor level, at y = 0.
@@ -62,7 +62,10 @@ STEPS: Mapping[str, tuple[str, str]] = {
         "recognise performers who get a new number",
     ),
     "swaps": ("Put swapped limbs right", "correct limbs whose left and right are exchanged"),
-    "outliers": ("Leave out wild jumps", "ignore joints that jump and bones that stretch"),
+    "outliers": (
+        "Leave out wild jumps",
+        "ignore joints that jump or are only guessed, and bones that stretch",
+    ),
     "filter": ("Smooth trembling", "smooth every joint (One-Euro)"),
     "predict": ("Make up for delay", "show where joints will be one frame later"),
     "level": ("Level the floor", "keep the floor level"),
