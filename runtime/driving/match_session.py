@@ -30,6 +30,7 @@ from solvers.retarget.source_limbs import simplify
 LEAST_SEEN = 0.5  # share of the driving joints that must be in view to strike a pose
 CHOICES = 32  # poses of a rehearsal, evenly spaced, that the rest state is chosen from
 TRIED = 16  # poses of a rehearsal that the puppets try: those that differ most
+BEGUN = 0.3  # [s] of keeping still, after which a countdown has begun
 PLACED = 128  # poses of a rehearsal, evenly spaced, whose places on the stage are looked at
 
 Array = NDArray[np.float64]
@@ -133,6 +134,11 @@ class MatchSession:
             return None
         patience = math.inf if self.waits else max(match.patience for match in sought)
         return max(patience - (self._now - self._since), 0.0)
+
+    @property
+    def counts(self) -> bool:
+        """Whether the performer has kept still for so long that the countdown can be seen."""
+        return self.countdown is not None and self._now - self._since >= BEGUN
 
     @property
     def matches(self) -> Sequence[PuppetMatch]:

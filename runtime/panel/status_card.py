@@ -11,7 +11,7 @@ from runtime.panel.gui import GOLD, LACQUER, PAPER
 from runtime.panel.widgets import Colour, card, dot, fitted, letters
 from runtime.session.transport import Mode
 from runtime.status.notices import Notice
-from runtime.status.prompts import advice, countdown, details, headline, is_paused
+from runtime.status.prompts import advice, counted_down, details, headline, is_paused
 from runtime.status.show_status import ShowStatus
 from runtime.status.stream_watch import Sight
 
@@ -95,7 +95,7 @@ def _light(status: ShowStatus) -> Colour:
 
 def draw_countdown(status: ShowStatus, scale: float) -> None:
     """Draw the seconds until a take or a match performs, large, in the middle of the picture."""
-    left = countdown(status)
+    left = counted_down(status)
     if left is None or left <= 0.0 or status.sighting.sight is not Sight.SEEN:
         return
     fade = 0.35 + 0.65 * (left - math.floor(left))

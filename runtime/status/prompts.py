@@ -122,6 +122,12 @@ def news(before: Sight, sighting: Sighting, origin: str) -> str:
     return f"waiting for a performer at {origin}"
 
 
+def counted_down(status: ShowStatus) -> float | None:
+    """[s] of a count-in or a countdown that goes by; None while the performer still moves."""
+    counts = status.count_in is not None or any(one.counts for one in status.characters)
+    return countdown(status) if counts else None
+
+
 def countdown(status: ShowStatus) -> float | None:
     """[s] until a count-in ends or what is shown performs by itself; None where nothing does."""
     if status.count_in is not None:

@@ -32,6 +32,7 @@ class CharacterStatus:
         candidate: the match that is shown; None where the anatomy chooses.
         countdown: [s] until what is shown performs by itself; infinite if it waits to be accepted,
             None while no pose is struck.
+        counts: whether the performer keeps still, so that this goes by.
     """
 
     name: str
@@ -40,6 +41,7 @@ class CharacterStatus:
     matching: bool
     candidate: Candidate | None
     countdown: float | None
+    counts: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,6 +193,7 @@ def _characters(act: Act) -> list[CharacterStatus]:
             matching=match.matching,
             candidate=match.candidate,
             countdown=session.countdown if match.matching else None,
+            counts=session.counts and match.matching,
         )
         for puppet, match in zip(act.puppets, session.matches, strict=True)
     ]

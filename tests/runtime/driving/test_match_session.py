@@ -244,11 +244,15 @@ def test_only_a_pose_that_is_kept_still_accepts_itself(puppet: Puppet) -> None:
     show = Rehearsal(puppet, Choices(patience=0.75, stray=0.15))
     for step in range(30):  # an arm that waves on; the match stays the same
         show.strike(pose({**T_POSE, "ElbowLeft": (0.0, 0.0, 0.6 * (step % 3))}))
+        assert not show.match_session.counts
     assert show.match_session.matching
-    left = []
+    left, counts = [], []
     while show.match_session.matching:
         show.strike(pose(T_POSE))
         left.append(show.match_session.countdown)
+        counts.append(show.match_session.counts)
+    assert counts[:2] == [False, False]
+    assert counts[-2], "it is seen to go by"
     assert left[0] == pytest.approx(0.75)
     assert left == [*sorted(left[:-1], reverse=True), None]
 

@@ -7,7 +7,15 @@ from dataclasses import replace
 import pytest
 
 from runtime.driving.choices import Candidate
-from runtime.status.prompts import advice, countdown, details, headline, news, place_of_match
+from runtime.status.prompts import (
+    advice,
+    countdown,
+    counted_down,
+    details,
+    headline,
+    news,
+    place_of_match,
+)
 from runtime.status.show_status import (
     CharacterStatus,
     PerformerStatus,
@@ -16,7 +24,7 @@ from runtime.status.show_status import (
 )
 from runtime.status.stream_watch import Sight, Sighting
 
-SQUID = CharacterStatus("squid", [], True, False, None, None)
+SQUID = CharacterStatus("squid", [], True, False, None, None, counts=False)
 LIVE = ShowStatus("vmc://127.0.0.1:39539", Sighting(Sight.SEEN, 2.0), [SQUID], [], None, False, 9)
 
 
@@ -85,6 +93,9 @@ def test_matching_names_the_match_and_the_seconds_left() -> None:
     assert "match 2 of 7" in said
     assert "starts in 3" in said
     assert countdown(replace(LIVE, characters=[proposed, SQUID])) == pytest.approx(2.2)
+    assert counted_down(replace(LIVE, characters=[proposed, SQUID])) is None, "who moves sees none"
+    still = replace(proposed, counts=True)
+    assert counted_down(replace(LIVE, characters=[still, SQUID])) == pytest.approx(2.2)
     waits = replace(proposed, countdown=float("inf"))
     assert countdown(replace(LIVE, characters=[waits])) is None
     assert "Enter accepts" in advice(replace(LIVE, characters=[waits]))
