@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from devices.errors import InputError
 from runtime.cli.options.arguments import size
 from runtime.cli.options.show_options import add_character_option
 
@@ -30,11 +31,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="width and height in pixels of a row of the paper's figures (default: 1500x420) or "
         "of the window (default: 1280x720)",
     )
-    add_character_option(drawn, default="cactus; the window has its own")
+    add_character_option(drawn, default="cactus; only for the paper's figures")
 
 
 def run(options: argparse.Namespace) -> int:
     """Write the pictures; print what each is, or its figures in numbers."""
+    if options.character and options.of != "paper":
+        raise InputError(f"--character is for the paper's figures; --of {options.of} has its own")
     if options.of == "window":
         from runtime.figures.window import draw_window
 

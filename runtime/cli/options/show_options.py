@@ -174,7 +174,13 @@ def _character(options: argparse.Namespace, number: int) -> CharacterSettings:
 def _pairs(options: argparse.Namespace) -> tuple[WordedPair, ...]:
     if options.map and options.mapping is not None:
         raise InputError("--map and --mapping both say what drives what; leave one of both out")
-    return tuple(map(read_pair, options.map))
+    pairs = tuple(map(read_pair, options.map))
+    if options.match != 1 and any(pair.character is None for pair in pairs):
+        raise InputError(
+            f"--match {options.match} chooses among matches, and with --map nothing is matched; "
+            "leave one of both out"
+        )
+    return pairs
 
 
 def _remote(options: argparse.Namespace) -> RemoteSettings | None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from devices.errors import InputError
@@ -23,12 +24,37 @@ class WordedPair:
     source: str
     target: str
 
+    @property
+    def character(self) -> str | None:
+        """The name of the character that is driven; None where none is named."""
+        name, colon, _ = self.target.partition(":")
+        return name.strip() if colon else None
+
     def target_of(self, character: str) -> str | None:
         """Return what is driven of a character, by its name; None where another one is named."""
-        name, colon, part = self.target.partition(":")
-        if not colon:
+        if self.character is None:
             return self.target
-        return part.strip() if name.strip().casefold() == character.casefold() else None
+        part = self.target.partition(":")[2].strip()
+        return part if self.character.casefold() == character.casefold() else None
+
+
+def check_named(pairs: Iterable[WordedPair], characters: Sequence[str]) -> None:
+    """Refuse pairs that name a character which is not there.
+
+    Args:
+        pairs: of all characters.
+        characters: their names.
+
+    Raises:
+        InputError: one does; the line says which characters there are.
+    """
+    known = {name.casefold() for name in characters}
+    for pair in pairs:
+        if pair.character is not None and pair.character.casefold() not in known:
+            raise InputError(
+                f'"{pair.source} -> {pair.target}": no character is called {pair.character!r}; '
+                f"there are: {', '.join(characters)}"
+            )
 
 
 def read_pair(words: str) -> WordedPair:

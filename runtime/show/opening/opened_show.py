@@ -18,6 +18,7 @@ from runtime.control.count_in import CountIn
 from runtime.control.hands_free import HandsFree
 from runtime.control.remote import PORT, Remote
 from runtime.control.show_controls import ShowControls, View
+from runtime.driving.by_hand.pair_words import check_named
 from runtime.driving.by_hand.parts import character_parts, performer_parts
 from runtime.driving.by_hand.worded import mapping_in_words
 from runtime.driving.drivers import LIMB_BY_LIMB, DriverFactory
@@ -103,7 +104,9 @@ class OpenedShow:
         self._source = stream
         self._stream = closing.enter_context(RecordedStream(stream))
         check_characters(settings, len(characters))
-        check_outputs(settings, [character.name for character in characters])
+        names = [character.name for character in characters]
+        check_outputs(settings, names)
+        check_named(settings.match.pairs, names)
         playback = playback_of(stream)
         if isinstance(playback, OfRecording) and settings.match.driver != "relative":
             playback.leave_out_false_start()

@@ -65,6 +65,7 @@ def test_a_character_that_is_named_takes_its_pairs_alone() -> None:
     [
         ("left arm -> wheel", "squid: 'wheel' is no part; there are: .*mantle"),
         ("left arm -> tentacle", "squid: 'tentacle' means several parts; there are: tentacle 1"),
+        ("left arm -> pig: snout", "no character is called 'pig'; there are: squid"),
         ("left wing -> mantle", "the performer: 'left wing' is no part; there are: .*left arm"),
     ],
 )
