@@ -14,6 +14,7 @@ from runtime.benchmarks.resemblance.ground import ground_figures, hover, slide, 
 from runtime.benchmarks.resemblance.limbs import compared, limb_figures, sides
 from runtime.benchmarks.resemblance.steadiness import jitter, steps_of_joints
 from runtime.benchmarks.resemblance.turns import (
+    beside,
     finger_curl_kept,
     hand_roll_kept,
     head_yaw_kept,
@@ -208,3 +209,10 @@ def test_a_joint_that_jumps_is_counted_in_heights():
     positions[5:, BODY.index("WristLeft"), 2] += 0.5
     height = np.ptp(BODY.rest_positions[:, 1])
     assert_allclose(steps_of_joints(positions), 0.5 / height * (np.arange(9) == 4), atol=1e-12)
+
+
+def test_a_hand_that_seems_to_go_round_once_more_rolls_as_the_other() -> None:
+    theirs = np.array([0.0, 40.0, np.nan, 90.0, 170.0, 100.0])
+    ours = theirs + 30.0
+    ours[4:] -= 360.0  # it was swung past the direction opposite to the mean
+    np.testing.assert_allclose(beside(ours, theirs), theirs + 30.0)

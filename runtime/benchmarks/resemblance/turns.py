@@ -67,7 +67,7 @@ def hand_roll_kept(performer: BodyTrack, character: BodyTrack) -> float:
         ours, our_width = (np.einsum("tij,tj->ti", found[1], each) for each in (ours, our_width))
         mean = unit(np.nanmean(theirs, axis=0)) if np.isfinite(theirs).any() else np.zeros(3)
         source.append(roll(theirs, their_width, mean))
-        target.append(roll(ours, our_width, mean))
+        target.append(beside(roll(ours, our_width, mean), source[-1]))
     return kept(source, target)
 
 
@@ -124,6 +124,25 @@ def roll(along: Array, width: Array, about: Array) -> Array:
     first = unit(np.cross(about, np.eye(3)[np.argmin(np.abs(about))]))
     second = np.cross(about, first)
     out[is_known] = np.degrees(np.unwrap(np.arctan2(swung @ second, swung @ first)))
+    return out
+
+
+def beside(angles: Array, others: Array) -> Array:
+    """Return the same angles (T,) [degrees], each by whole turns so near to another as it can be.
+
+    Two hands that roll alike are a constant apart. Unwrapped alone, one of them may go round once
+    more where it swings past the opposite of the direction that all are swung to.
+
+    Args:
+        angles, others: (T,) [degrees]; NaN where not known.
+    """
+    apart = np.radians(angles - others)
+    is_known = np.isfinite(apart)
+    if not is_known.any():
+        return angles
+    usual = np.degrees(np.angle(np.exp(1j * apart[is_known]).mean()))
+    near = others + usual
+    out: Array = near + (angles - near + 180.0) % 360.0 - 180.0
     return out
 
 
