@@ -81,18 +81,22 @@ class Panel:
         status, controls, scale = self._newest_status(), self._controls, self.gui.scale
         margin = MARGIN * scale
         self._take_room()
+        end = 0.0
         if controls.view.help:
             draw_keys(controls, margin)
         elif controls.view.panel:
-            self._lay_cards(status, margin)
+            end = self._lay_cards(status, margin)
         else:
             draw_notices(controls.notices.current, margin, scale)
             draw_hands_free(status, margin, scale)
         if not controls.view.help:
-            draw_countdown(status, scale)
+            draw_countdown(status, end, scale)
 
-    def _lay_cards(self, status: ShowStatus, margin: float) -> None:
-        """Lay out the cards along the borders of the picture; note how much of it they take."""
+    def _lay_cards(self, status: ShowStatus, margin: float) -> float:
+        """Lay out the cards along the borders of the picture; note how much of it they take.
+
+        Return where the card at the top ends [px].
+        """
         controls, scale = self._controls, self.gui.scale
         screen, sliders = imgui.get_io().display_size, controls.view.sliders
         inset = 0.0 if controls.scene is None else controls.scene.inset_side
@@ -100,7 +104,7 @@ class Panel:
         column = margin + SLIDERS * scale
         beside = sliders and screen.x - left - column - margin >= STATUS_LEAST * scale
         width = screen.x - left - right - (column if beside else 0.0)
-        below = draw_status(status, controls.notices.current, left, width, margin, scale)
+        below, end = draw_status(status, controls.notices.current, left, width, margin, scale)
         above = draw_bar(status, controls, margin, scale)
         if controls.session is not None:
             above += self._timeline.draw(controls, margin, above - margin, scale)
@@ -119,6 +123,7 @@ class Panel:
             below / screen.y,
             (above - margin) / screen.y,
         )
+        return end
 
     def _take_room(self) -> None:
         """Let the scene draw all that is framed clear of the panel, as far as it has unfolded."""

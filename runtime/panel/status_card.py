@@ -40,10 +40,10 @@ def draw_status(
     width: float,
     margin: float,
     scale: float,
-) -> float:
+) -> tuple[float, float]:
     """Draw the card at the top, from `left` on, up to `width` wide [px], with all its lines.
 
-    Return where it ends below, without the notices, which come and go [px].
+    Return where it ends below [px]: without the notices, which come and go, and with them.
     """
     with card("status", left, margin, min(WIDTH * scale, width)):
         with letters(HEADLINE):
@@ -69,7 +69,8 @@ def draw_status(
             imgui.text(f"recording {take.path.name}: {clock(take.seconds)}, {take.frames} frames")
         below = imgui.get_cursor_screen_pos().y - imgui.get_style().item_spacing.y
         _draw_lines(notices, scale)
-    return float(below + imgui.get_style().window_padding.y)
+        end = imgui.get_cursor_screen_pos().y
+    return float(below + imgui.get_style().window_padding.y), float(end)
 
 
 def _draw_hands_free(status: ShowStatus, scale: float) -> None:
@@ -93,13 +94,13 @@ def _light(status: ShowStatus) -> Colour:
     return GOLD if sight is Sight.SEEN and status.matching else SIGHTS[sight]
 
 
-def draw_countdown(status: ShowStatus, scale: float) -> None:
-    """Draw the seconds until a take or a match performs, large, in the middle of the picture."""
+def draw_countdown(status: ShowStatus, below: float, scale: float) -> None:
+    """Draw the seconds until a take or a match performs, large, `below` a card at the top [px]."""
     left = counted_down(status)
     if left is None or left <= 0.0 or status.sighting.sight is not Sight.SEEN:
         return
     fade = 0.35 + 0.65 * (left - math.floor(left))
-    top = 0.16 * imgui.get_io().display_size.y
+    top = max(0.16 * imgui.get_io().display_size.y, below)
     if status.count_in is not None:
         with letters(COUNTED):
             top = _draw_large(f"{status.count_in[0].value} in", top, 1.0, scale)

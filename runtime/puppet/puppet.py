@@ -50,6 +50,11 @@ class Layers(Protocol):
         """Whether the character moves as its driver says, so that highlights lie on it."""
         ...
 
+    @property
+    def seeks(self) -> bool:
+        """Whether a match is looked for, so that what it would move lights up."""
+        ...
+
     def over(self, targets: Targets, time: float) -> Targets:
         """Return the targets with that motion, for a frame at `time` [s]."""
         ...
@@ -244,17 +249,16 @@ class Puppet:
     @property
     def highlights(self) -> list[Highlight]:
         """The highlights of the driver that is proposed, or else of the one that moves it."""
-        place, nodes = self._stance.place, self._targets.nodes
-        if self.layers is not None and not self.layers.shows_driver:
-            return []
-        if self.proposal is not None and nodes is not None:
-            return [  # on the character as it is now, which another driver moves
-                Highlight(place(nodes.positions[list(part.target)]), part.source[1:])
-                for part in self.proposal.parts
-            ]
+        place, nodes, layers = self._stance.place, self._targets.nodes, self.layers
         driver = self.driver if self.proposal is None else self.proposal
-        if driver is None:
+        seeks = layers is not None and layers.seeks
+        if driver is None or (layers is not None and not layers.shows_driver and not seeks):
             return []
+        if nodes is not None and (self.proposal is not None or seeks):
+            return [  # on the character as it is now, which something else moves
+                Highlight(place(nodes.positions[list(part.target)]), part.source[1:])
+                for part in driver.parts
+            ]
         return [replace(each, points=place(each.points)) for each in driver.highlights]
 
     def stood(self, skinned: SkinnedTargets, placement: Placement) -> Array:

@@ -31,12 +31,14 @@ class Cue:
         session: what plays.
         position: [s] of the session's time.
         live: whether a performer moves the actor.
+        seeks: whether a match is looked for with a performer who would move it.
         recording: whether that is recorded.
     """
 
     session: Session
     position: float
     live: bool
+    seeks: bool
     recording: bool
 
 
@@ -48,6 +50,9 @@ class ActorLayers:
         puppet: the character on the stage.
         cue: says what to do at a frame of the show at a time [s].
         named: gives the nodes that the puppet's driver names as driven.
+
+    Attributes:
+        seeks: whether a match is looked for, so that what it would move lights up.
     """
 
     def __init__(
@@ -62,6 +67,7 @@ class ActorLayers:
         tree = puppet.bound_skeleton.tree
         self._player = ActorPlayer(actor, tree, len(puppet.face.weights))
         self._weight, self._at = 1.0, math.nan
+        self.seeks = False
         self._driver: object = None
         self._moved = np.zeros(len(tree), dtype=np.bool_)
         self._recorder: PerformanceRecorder | None = None
@@ -94,7 +100,7 @@ class ActorLayers:
         """
         cue = self._cue(time)
         face = self.puppet.face.weights
-        weight = self._follow(cue.live, time)
+        weight, self.seeks = self._follow(cue.live, time), cue.seeks
         if targets.nodes is None:
             return targets
         if cue.live:

@@ -11,7 +11,7 @@ from devices.skeleton import Skeleton
 from runtime.puppet.puppet import Puppet
 from runtime.session import edits
 from runtime.session.actor_layers import ActorLayers, Cue
-from runtime.session.document import Session, Take, next_id
+from runtime.session.document import Session, Take
 from runtime.session.files import unfinished
 from runtime.session.files.store import SessionStore
 from runtime.session.kiosk import Kiosk
@@ -243,8 +243,12 @@ class LiveSession:
 
     @property
     def _next_name(self) -> str:
-        """What the next take is called."""
-        return f"take {next_id(self.session.takes)}"
+        """What the next take is called: all that is recorded at once has one name."""
+        names = {take.name for take in self.session.takes}
+        number = len(names) + 1
+        while f"take {number}" in names:
+            number += 1
+        return f"take {number}"
 
     def _add(
         self,
@@ -311,11 +315,13 @@ class LiveSession:
                 if self.kiosk is not None:
                     self.kiosk.follow(time, seen=any(each.seen() for each in self._staged))
             mode = self.transport.mode
-            live = mode in (Mode.REHEARSING, Mode.RECORDING)
+            live = mode in (Mode.REHEARSING, Mode.RECORDING) and self._armed(one.puppet)
+            performs = one.performs()
             return Cue(
                 self.session,
                 self.transport.position,
-                live and one.performs() and self._armed(one.puppet),
+                live and performs,
+                live and not performs and one.seen(),
                 mode is Mode.RECORDING,
             )
 

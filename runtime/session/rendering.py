@@ -96,7 +96,9 @@ class RenderedSession:
 
         def cue(time: float) -> Cue:
             began[:] = began or [time]
-            return Cue(session, self._start + time - began[0], live=False, recording=False)
+            return Cue(
+                session, self._start + time - began[0], live=False, seeks=False, recording=False
+            )
 
         for actor, puppet in zip(session.actors, show.puppets, strict=True):
             if len(puppet.character.skeleton.names) != actor.nodes:

@@ -74,6 +74,28 @@ def test_a_take_plays_what_was_performed(tmp_path: Path, character: str) -> None
     assert np.abs(played[5] - played[30]).max() > 0.05 * height
 
 
+def test_a_match_that_is_looked_for_lights_up_before_anybody_has_performed(tmp_path: Path) -> None:
+    with open_show(tmp_path / "s.bunraku", "squid", rehearse=False, patience=60.0) as show:
+        ticks(show, 3)
+        assert show.controls.match_controls.matching
+        (puppet,) = show.puppets
+        parts = show.controls.match_controls.matches[0].parts
+        assert [each.joints for each in puppet.highlights] == [part.source[1:] for part in parts]
+        assert parts
+
+
+def test_all_that_is_recorded_at_once_is_one_take_by_name(tmp_path: Path) -> None:
+    stream = play(builtin_recording("wave"), every_frame=True, loop=True)
+    characters = [load_character(name) for name in ("squid", "mannequin")]
+    with Show(stream, characters, session=SessionStore(tmp_path / "s.bunraku")) as show:
+        for _ in range(2):
+            record(show, 5)
+        session = show.controls.session
+        assert session is not None
+        names = [take.name for take in session.session.takes]
+    assert names == ["take 1", "take 1", "take 2", "take 2"]
+
+
 def test_any_jump_shows_the_same_bytes_as_playing_there(tmp_path: Path) -> None:
     with open_show(tmp_path / "s.bunraku") as show:
         record(show, 60)
