@@ -165,7 +165,10 @@ class LiveSession:
     def stand_by(self) -> bool:
         """Let performers move the characters where a take is to begin; return whether it can."""
         if not self.performed:
-            self._warn("no performer moves a character that is selected: nothing to record yet")
+            self._warn(
+                "no performer moves a selected character yet: step into view, and press Enter to "
+                "use the match; then r records"
+            )
             return False
         if not self.recording:
             self.transport.rehearse()

@@ -180,6 +180,8 @@ def _candidate(character: CharacterStatus) -> str:
 
 def _accepting(status: ShowStatus) -> str:
     left = countdown(status)
+    if status.hands_free is not None and status.hands_free[0]:
+        return "Make the gesture below to use it."
     if left is None:
         return "Enter accepts it, the arrows show others."
     return f"Keep still: it starts in {math.ceil(left)}. Enter starts it, the arrows show others."

@@ -126,3 +126,10 @@ def test_news_tell_a_return_from_a_first_sight() -> None:
     came, back = Sighting(Sight.SEEN, 0.0), Sighting(Sight.SEEN, 0.0)
     assert news(Sight.WAITING, came, "x") != news(Sight.LOST, back, "x")
     assert "rest" in news(Sight.SEEN, Sighting(Sight.LOST, 0.0), "x")
+
+
+def test_who_has_no_hand_free_is_not_asked_for_a_key_while_a_match_is_looked_for() -> None:
+    proposed = replace(SQUID, matching=True, candidate=Candidate(2, 7, 0.8), countdown=2.2)
+    asked = replace(LIVE, characters=[proposed], hands_free=("Clap three times", 0.0))
+    assert "Make the gesture below" in advice(asked)
+    assert "Enter" not in advice(asked)
