@@ -6,7 +6,7 @@ import json
 import threading
 import time
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
@@ -46,6 +46,7 @@ LISTENS = ("vmc", "vrchat", "nimate", "rokoko", "xsens", "mediapipe")
 """The kinds of device that open a UDP port of this machine."""
 
 POLL_STEP = 0.02  # [s] between two polls
+WAKES = 0.1  # [s] at most until Ctrl-C is noticed
 
 
 class State(StrEnum):
@@ -108,8 +109,11 @@ def watch(
     stop = threading.Event()
     with ThreadPoolExecutor(len(addresses)) as pool:
         try:
-            waiting = [pool.submit(_watch, address, seconds, stop, clock) for address in addresses]
-            return [one.result() for one in waiting]
+            watches = [pool.submit(_watch, address, seconds, stop, clock) for address in addresses]
+            # A signal that comes just before a wait without end begins would not end it.
+            while wait(watches, timeout=WAKES).not_done:
+                pass
+            return [one.result() for one in watches]
         finally:
             stop.set()  # Ctrl-C ends all of them
 
