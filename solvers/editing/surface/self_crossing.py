@@ -31,7 +31,9 @@ def crosses_itself(vertices: Array, triangles: Indices, chosen: Flags) -> bool:
     one = mine[np.concatenate([np.array(each, dtype=np.int64) for each in pairs])]
     other = np.repeat(near, counts)
     apart = np.linalg.norm(middles[one] - middles[other], axis=1) <= reach[one] + reach[other]
-    apart &= ~(triangles[one][:, :, None] == triangles[other][:, None, :]).any(axis=(1, 2))
+    # Triangles that share one corner may still cross; those that share an edge cannot.
+    common = (triangles[one][:, :, None] == triangles[other][:, None, :]).sum(axis=(1, 2))
+    apart &= common < 2
     one, other = one[apart], other[apart]
     fine = _ROUNDING * float(np.ptp(vertices, axis=0).max())
     return _pierced(corners[one], corners[other], fine) or _pierced(

@@ -13,6 +13,7 @@ SHORT = 0.45
 
 _FLAT = 0.9  # cosine between two triangles whose edge may be flipped
 _TURNED = 0.6  # cosine by which a triangle may turn when a corner of it moves
+_LOST = 0.01  # of the usual edge cubed: what one collapse may take from a triangle's volume
 _LONG = 2.0  # of the usual edge: no collapse makes a longer one
 _PASSES = 4
 _TINY = 1e-300
@@ -132,6 +133,8 @@ class _Patch:
     def _may_move(self, corners: list[Point], which: int, to: Point) -> bool:
         """Whether a triangle stays sound when one of its corners moves."""
         n, size, square = _measured(*corners)
+        if abs(_dot(n, _minus(to, corners[which]))) > _LOST * self._edge**3:
+            return False
         corners[which] = to
         m, new_size, new_square = _measured(*corners)
         if size > 0.02 * square and _dot(n, m) < _TURNED * size * new_size:
